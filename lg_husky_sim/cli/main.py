@@ -1,0 +1,122 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The `lg_husky` command: finds the verbs, and turns our errors into one line and an exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module, metadata
+from importlib.util import find_spec
+import os
+import sys
+
+import click
+
+from lg_husky_sim.errors import LgHuskyError
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells expect it (128 + SIGINT)."""
+
+VERBS = {
+    'demo': 'lg_husky_sim.cli.demo',
+    'derive': 'lg_husky_sim.cli.derive',
+    'simulate': 'lg_husky_sim.cli.simulate',
+    'drive': 'lg_husky_sim.cli.drive',
+    'record': 'lg_husky_sim.cli.record',
+    'compare': 'lg_husky_sim.cli.compare',
+    'identify': 'lg_husky_sim.cli.identify',
+    'evaluate': 'lg_husky_sim.cli.evaluate',
+    'diagnose': 'lg_husky_sim.cli.diagnose',
+    'plan-drive': 'lg_husky_sim.cli.plan_drive',
+    'prove': 'lg_husky_sim.cli.prove',
+    'twin': 'lg_husky_sim.cli.twin',
+    'import': 'lg_husky_sim.cli.import_',
+}
+"""Verb to the module whose `command` is its click command, in the order of a newcomer's tour."""
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when asked for, so that each verb starts quickly."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return [verb for verb, module in VERBS.items() if find_spec(module) is not None]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        command = import_module(VERBS[cmd_name]).command
+        if not isinstance(command, click.Command):
+            message = f'{VERBS[cmd_name]}.command is no click command'
+            raise TypeError(message)
+        return command
+
+
+def version() -> str:
+    """Return the installed version, or that there is none (a source tree without install)."""
+    try:
+        return metadata.version('lg_husky_sim')
+    except metadata.PackageNotFoundError:
+        return 'not installed'
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={'help_option_names': ['-h', '--help']},
+    epilog='Completion for your shell: eval "$(_LG_HUSKY_COMPLETE=bash_source lg_husky)" '
+           '(or zsh_source, fish_source). The live node is a program of its own: sim_node.',
+)
+@click.version_option(version(), '-V', '--version', prog_name='lg_husky')
+def cli() -> None:
+    """Digital twin of the Clearpath Husky: derive, simulate, compare, identify, diagnose."""
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """
+    Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        The arguments without the program's name; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit code: 0 done, 1 bad input or a file that cannot be read or written (one line on
+        standard error says which), 130 interrupted.
+
+    """
+    try:
+        code = cli.main(arguments, prog_name='lg_husky', standalone_mode=False)
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        return fail('interrupted', INTERRUPTED)
+    except click.exceptions.NoArgsIsHelpError as error:
+        error.show()
+        return 1
+    except click.UsageError as error:
+        where = error.ctx.command_path if error.ctx else 'lg_husky'
+        return fail(f'error: {error.format_message()} (see {where} -h)')
+    except click.ClickException as error:
+        return fail(f'error: {error.format_message()}')
+    except BrokenPipeError:
+        # The reader (head, less) has left; keep the interpreter from flushing into nothing.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except (LgHuskyError, OSError) as error:
+        return fail(f'error: {error}')
+    return code if isinstance(code, int) else 0
+
+
+def fail(message: str, code: int = 1) -> int:
+    """Print the message as one line on standard error; return the exit code."""
+    click.echo(' '.join(message.split()), err=True)
+    return code
+
+
+def main() -> None:
+    """Run the command line as a process: the entry point `lg_husky`."""
+    sys.exit(run())
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,100 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Installation with pip or colcon; the same package either way."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+package_name = 'lg_husky_sim'
+
+# Folders beside the package that it reads at run time. They travel inside the wheel (and are found
+# there by lg_husky_sim/resources.py) and, as ROS users expect, in share/ too.
+DATA_FOLDERS = [folder for folder in ('config', 'urdf') if Path(folder).is_dir()]
+SHARE_FOLDERS = [*DATA_FOLDERS, *(folder for folder in ('launch',) if Path(folder).is_dir())]
+
+EXTRAS = {
+    'fast': ['numba>=0.59'],
+    'plot': ['matplotlib>=3.6'],
+    'bags': ['rosbags>=0.10.10'],
+    # cyclonedds ships no wheel for Linux on ARM and none after Python 3.13.
+    'dds': [
+        'cyclonedds>=0.10.5,!=11.0.0; python_version < "3.14"'
+        ' and (platform_machine == "x86_64" or platform_machine == "AMD64"'
+        ' or sys_platform == "darwin")',
+    ],
+    'engine': ['mujoco>=3.1'],
+    'scale': ['dask[distributed]>=2024.1'],
+    'report': ['jinja2>=3.1'],
+}
+EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report')
+                 for need in EXTRAS[extra]]
+EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale']]
+EXTRAS['test'] = ['hypothesis>=6.100', 'pytest>=8', 'pytest-xdist>=3.5']
+EXTRAS['dev'] = [
+    *EXTRAS['test'],
+    'flake8>=7',
+    'flake8-builtins>=2.5',
+    'flake8-comprehensions>=3.14',
+    'flake8-docstrings>=1.7',
+    'flake8-import-order>=0.18.2',
+    'flake8-quotes>=3.4',
+    'mypy>=1.11',
+    'pydocstyle>=6.3',
+    'ruff>=0.6',
+    'types-PyYAML',
+    'types-tqdm',
+]
+
+
+def files_of(folder):
+    """Return one data_files row for each folder below (and with) the given one."""
+    rows = {}
+    for path in sorted(Path(folder).rglob('*')):
+        if path.is_file() and '__pycache__' not in path.parts:
+            rows.setdefault(f'share/{package_name}/{path.parent.as_posix()}', []).append(
+                path.as_posix())
+    return list(rows.items())
+
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    description='Live digital twin of the Clearpath Husky, derived from a linear graph',
+    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
+    author='lg_husky_sim contributors',
+    maintainer='lg_husky_sim contributors',
+    maintainer_email='maintainers@lg-husky-sim.example',
+    license='Apache-2.0',
+    python_requires='>=3.11',
+    packages=[
+        *find_packages(exclude=['test', 'test.*', 'benchmarks', 'benchmarks.*']),
+        *(f'{package_name}.{folder}' for folder in DATA_FOLDERS),
+    ],
+    package_dir={f'{package_name}.{folder}': folder for folder in DATA_FOLDERS},
+    package_data={'': ['py.typed', '*.yaml', '*.urdf', '*.xml', '*.json', '*.j2', '*.html',
+                       '*.css', '*.js', '*.svg']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (f'share/{package_name}', ['package.xml']),
+        *(row for folder in SHARE_FOLDERS for row in files_of(folder)),
+    ],
+    install_requires=[
+        'click>=8.1',
+        'numpy>=1.26',
+        'pyyaml>=6.0',
+        'scipy>=1.11',
+        'setuptools',
+        'sympy>=1.12',
+        'tqdm>=4.60',
+    ],
+    extras_require=EXTRAS,
+    zip_safe=False,
+    entry_points={
+        'console_scripts': [
+            'sim_node = lg_husky_sim.ros.sim_node:main',
+            'lg_husky = lg_husky_sim.cli.main:main',
+        ],
+    },
+)
