@@ -1,0 +1,21 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Recordings: ROS bags read into time series, and written from them.
+
+Reads rosbag2 (MCAP, sqlite3) and ROS 1 bags without ROS, by way of the library `rosbags`.
+"""
+
+from lg_husky_sim.recording.reader import read_recording
+from lg_husky_sim.recording.recording import Recording, Segment, segments
+from lg_husky_sim.recording.topics import TopicMap
+from lg_husky_sim.recording.writer import write_recording
+
+__all__ = [
+    'Recording',
+    'Segment',
+    'TopicMap',
+    'read_recording',
+    'segments',
+    'write_recording',
+]

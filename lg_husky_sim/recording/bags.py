@@ -1,0 +1,130 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Bags on disk: opened, listed and read message by message, through `rosbags`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+
+from lg_husky_sim.errors import LgHuskyError, MissingExtraError, RecordingError
+from lg_husky_sim.recording.topics import Topic
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+
+SUFFIXES = ('.mcap', '.db3', '.bag')
+LONGEST_REASON = 200
+
+
+class Bag:
+    """An open bag."""
+
+    def __init__(self, reader: AnyReader) -> None:
+        self._reader = reader
+
+    def topics(self) -> tuple[Topic, ...]:
+        """Return the topics of the bag; one of several types is there once for each."""
+        counts: dict[tuple[str, str], int] = {}
+        for connection in self._reader.connections:
+            key = (connection.topic, connection.msgtype)
+            counts[key] = counts.get(key, 0) + connection.msgcount
+        return tuple(Topic(name, kind, count) for (name, kind), count in counts.items())
+
+    def messages(self, wanted: Iterable[Topic]) -> Iterator[tuple[Topic, int, Any]]:
+        """
+        Yield the messages of some topics; no other is decoded.
+
+        Yields
+        ------
+        topic : Topic
+        logged : int
+            Log time [ns].
+        message : object
+            With the fields of its ROS type.
+        """
+        by_key = {(topic.name, topic.kind): topic for topic in wanted}
+        connections = [connection for connection in self._reader.connections
+                       if (connection.topic, connection.msgtype) in by_key]
+        if not connections:
+            return
+        for connection, logged, raw in self._reader.messages(connections=connections):
+            topic = by_key[connection.topic, connection.msgtype]
+            yield topic, logged, self._reader.deserialize(raw, connection.msgtype)
+
+
+@contextmanager
+def open_bag(path: Path) -> Iterator[Bag]:
+    """
+    Open a bag: a rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag file.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+
+    Yields
+    ------
+    Bag
+
+    Raises
+    ------
+    RecordingError
+        If it is no bag, or it is damaged; whatever the library raises on damaged bytes while
+        the bag is open becomes this error.
+    MissingExtraError
+        If `rosbags` is not installed.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import get_typestore, Stores
+    except ImportError as error:
+        raise MissingExtraError(
+            'reading recordings needs the package rosbags: pip install rosbags') from error
+    files = _files(path)
+    try:
+        reader = AnyReader(files, default_typestore=get_typestore(Stores.ROS2_JAZZY))
+        with reader:
+            yield Bag(reader)
+    except LgHuskyError:
+        raise
+    except Exception as error:  # damaged bytes raise anything in the decoders below
+        raise RecordingError(f'cannot read {path}: {_reason(error)}{_advice(files)}') from error
+
+
+def _files(path: Path) -> list[Path]:
+    """Return what to open for a path that the user named."""
+    if path.name == 'metadata.yaml' and path.is_file():
+        path = path.parent
+    if not path.exists():
+        raise RecordingError(f'no recording {path}: there is no such file or folder')
+    if path.is_dir():
+        if (path / 'metadata.yaml').is_file():
+            return [path]
+        parts = sorted(part for part in path.iterdir() if part.suffix in SUFFIXES)
+        if len({part.suffix for part in parts}) == 1:
+            return parts
+        raise RecordingError(
+            f'{path} is no recording: a rosbag2 folder holds metadata.yaml or files of one kind '
+            f'of {", ".join(SUFFIXES)}')
+    if path.suffix not in SUFFIXES:
+        raise RecordingError(
+            f'{path} is no recording: a rosbag2 folder or a file {", ".join(SUFFIXES)} is')
+    return [path]
+
+
+def _reason(error: Exception) -> str:
+    """Return the text of an error on one line, its type where it has none."""
+    text = ' '.join(str(error).split())
+    if len(text) > LONGEST_REASON:
+        text = text[:LONGEST_REASON] + '…'
+    kind = type(error).__name__
+    return text if text and kind.endswith('ReaderError') else f'{kind} {text}'.strip()
+
+
+def _advice(files: list[Path]) -> str:
+    """Return how to repair a bag of this kind."""
+    if files[0].suffix == '.bag':
+        return ' (a damaged bag can often be repaired with `rosbag reindex`)'
+    return ' (a recording cut off can often be repaired with `ros2 bag reindex` or `mcap recover`)'

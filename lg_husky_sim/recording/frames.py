@@ -1,0 +1,137 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The planar pose of the base out of a tree of transforms."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from lg_husky_sim.errors import RecordingError
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+ODOM_FRAMES = ('odom', 'odom_combined', 'wheel_odom', 'odometry', 'map', 'world', 'earth')
+BASE_FRAMES = ('base_link', 'base_footprint', 'base', 'chassis_link', 'base_frame')
+ALIKE, UNLIKE = 100, 200
+
+Edge = tuple[str, str]
+
+
+def plain_frame(name: str) -> str:
+    """Return a frame name without leading slash and namespace."""
+    return name.strip('/').rsplit('/', 1)[-1]
+
+
+def quaternion_heading(x: float, y: float, z: float, w: float) -> float:
+    """
+    Return the yaw angle [rad] of a quaternion, which need not have norm one.
+
+    NaN for a quaternion of norm zero or with a value that is not finite.
+    """
+    if not np.isfinite(x + y + z + w) or x == y == z == w == 0.0:
+        return float('nan')
+    return float(np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))
+
+
+def pose_chain(
+    edges: Collection[Edge], odom_frame: str = '', base_frame: str = '',
+) -> tuple[Edge, ...]:
+    """
+    Choose the transforms that make up the pose of the base.
+
+    Without wishes: odom to base_link if it is there, else the one that looks most like it by
+    the names of both frames. With wishes: the shortest way down from one to the other.
+
+    Parameters
+    ----------
+    edges : collection of (parent, child)
+        Transforms recorded, names without slash and namespace.
+    odom_frame, base_frame : str
+        Frames wished for; an empty one is free.
+
+    Returns
+    -------
+    tuple of (parent, child)
+        From the top down; empty if nothing looks like a pose of the base.
+
+    Raises
+    ------
+    RecordingError
+        If a frame wished for is not there, or no way leads to it.
+    """
+    tree = sorted(edges)
+    if odom_frame or base_frame:
+        return _wished(tree, plain_frame(odom_frame), plain_frame(base_frame))
+    ranked = sorted(
+        (_rank(parent, ODOM_FRAMES, ('odom', 'map', 'world')),
+         _rank(child, BASE_FRAMES, ('base', 'footprint', 'husky')), (parent, child))
+        for parent, child in tree)
+    for parent_rank, child_rank, edge in ranked:
+        if parent_rank < UNLIKE and child_rank < UNLIKE:
+            return (edge,)
+    return ()
+
+
+def compose(
+    chain: Collection[Edge], series: Mapping[Edge, tuple[FloatArray, FloatArray]],
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Multiply planar transforms along a chain, at the stamps of its densest one.
+
+    Parameters
+    ----------
+    chain : collection of (parent, child)
+        From the top down, at least one.
+    series : mapping of (parent, child) to (times, values)
+        Times [s], shape (n,), and x, y, heading [m, m, rad], shape (n, 3), heading unwrapped.
+
+    Returns
+    -------
+    times : numpy.ndarray, shape (n,)
+    values : numpy.ndarray, shape (n, 3)
+        x, y, heading of the last child in the first parent.
+    """
+    ways = [series[edge] for edge in chain]
+    times = max((way[0] for way in ways), key=lambda stamps: stamps.size)
+    total = np.zeros((times.size, 3))
+    for stamps, values in ways:
+        x, y, heading = (np.interp(times, stamps, values[:, k]) for k in range(3))
+        cosine, sine = np.cos(total[:, 2]), np.sin(total[:, 2])
+        total = np.column_stack((
+            total[:, 0] + cosine * x - sine * y,
+            total[:, 1] + sine * x + cosine * y,
+            total[:, 2] + heading))
+    return times, total
+
+
+def _rank(name: str, known: tuple[str, ...], parts: tuple[str, ...]) -> int:
+    if name in known:
+        return known.index(name)
+    return ALIKE if any(part in name.lower() for part in parts) else UNLIKE
+
+
+def _wished(tree: list[Edge], top: str, bottom: str) -> tuple[Edge, ...]:
+    frames = sorted({frame for edge in tree for frame in edge})
+    for frame in (top, bottom):
+        if frame and frame not in frames:
+            raise RecordingError(f'no frame {frame!r}; there are {", ".join(frames) or "none"}')
+    for start in [top] if top else [frame for frame in ODOM_FRAMES if frame in frames]:
+        for end in [bottom] if bottom else [frame for frame in BASE_FRAMES if frame in frames]:
+            chain = _way(tree, start, end)
+            if chain:
+                return chain
+    raise RecordingError(
+        f'no way from frame {top or "odom"} to {bottom or "base_link"}; transforms: '
+        + ', '.join(f'{parent} -> {child}' for parent, child in tree))
+
+
+def _way(tree: list[Edge], start: str, end: str) -> tuple[Edge, ...]:
+    """Return the shortest chain of transforms, empty without one; breadth first."""
+    ways: dict[str, tuple[Edge, ...]] = {start: ()}
+    queue = [start]
+    for frame in queue:
+        for parent, child in tree:
+            if parent == frame and child not in ways:
+                ways[child] = (*ways[frame], (parent, child))
+                queue.append(child)
+    return ways.get(end, ())

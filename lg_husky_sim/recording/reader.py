@@ -1,0 +1,184 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A bag to a `Recording`: topics found, messages collected, clocks joined, samples cleaned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from lg_husky_sim.errors import RecordingError
+from lg_husky_sim.recording.bags import Bag, open_bag, SUFFIXES
+from lg_husky_sim.recording.clean import clean, joined, Sample, wheel_streams
+from lg_husky_sim.recording.clock import common_clock
+from lg_husky_sim.recording.decode import Collected, COLLECTORS, edge_name, Rows
+from lg_husky_sim.recording.frames import compose, Edge, pose_chain
+from lg_husky_sim.recording.recording import CHANNELS, Recording
+from lg_husky_sim.recording.topics import candidates, listing, Topic, TopicMap, TYPES
+from lg_husky_sim.signals import TimeSeries
+import numpy as np
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The topic that serves a role, and what it gave."""
+
+    topic: Topic
+    collected: Collected
+
+
+def read_recording(path: str | PathLike[str], topics: TopicMap | None = None) -> Recording:
+    """
+    Read a ROS bag.
+
+    Topics are found by type and name; header stamps are taken where they are there and make
+    sense, log times otherwise; samples are sorted, of those with one stamp the last one counts,
+    and samples that are not finite are dropped. What was repaired stands in ``notes``.
+
+    Parameters
+    ----------
+    path : path-like
+        A rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag file.
+    topics : TopicMap, optional
+        Topics and frames chosen by hand.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    RecordingError
+        If there is no bag at `path`, it is damaged, a topic chosen by hand is not in it, or
+        nothing in it is of use; the last two list what is there.
+    MissingExtraError
+        If the package `rosbags` is not installed.
+    """
+    place = Path(path)
+    chosen = topics or TopicMap()
+    with open_bag(place) as bag:
+        present = bag.topics()
+        found = _collect(bag, present, chosen)
+    try:
+        return _recording(place, present, found, chosen)
+    except RecordingError as error:
+        raise RecordingError(f'cannot use {place}: {error}') from error
+
+
+def _collect(bag: Bag, present: tuple[Topic, ...], chosen: TopicMap) -> dict[str, _Found]:
+    """Read the likeliest topic of each role; the next one where it gave nothing."""
+    waiting = {role: list(candidates(role, present, getattr(chosen, role))) for role in TYPES}
+    found: dict[str, _Found] = {}
+    while any(waiting.values()):
+        attempt = {role: topics.pop(0) for role, topics in waiting.items() if topics}
+        for role, collected in _read(bag, attempt).items():
+            if _serves(role, collected, chosen):
+                found[role] = _Found(attempt[role], collected)
+                waiting[role] = []
+            else:  # kept for the message that nothing serves
+                found.setdefault(role, _Found(attempt[role], collected))
+    return found
+
+
+def _read(bag: Bag, attempt: Mapping[str, Topic]) -> dict[str, Collected]:
+    collected = {role: Collected() for role in attempt}
+    by_topic: dict[Topic, list[str]] = {}
+    for role, topic in attempt.items():
+        by_topic.setdefault(topic, []).append(role)
+    for topic, logged, message in bag.messages(by_topic):
+        for role in by_topic[topic]:
+            COLLECTORS[role, topic.kind](collected[role], logged, message)
+    return collected
+
+
+def _serves(role: str, collected: Collected, chosen: TopicMap) -> bool:
+    if role == 'pose':
+        return bool(_chain(collected, chosen))
+    return bool(collected.rows)
+
+
+def _chain(collected: Collected, chosen: TopicMap) -> tuple[Edge, ...]:
+    edges = [(name.split('>')[0], name.split('>')[1]) for name in collected.rows]
+    return pose_chain(edges, chosen.odom_frame, chosen.base_frame)
+
+
+def _recording(
+    path: Path, present: tuple[Topic, ...], found: Mapping[str, _Found], chosen: TopicMap,
+) -> Recording:
+    notes: list[str] = []
+    chain: tuple[Edge, ...] = ()
+    rows: dict[str, Rows] = {}
+    origin: dict[str, str] = {}
+    for role, entry in found.items():
+        if role == 'pose':
+            chain = _chain(entry.collected, chosen)
+            names = [edge_name(*edge) for edge in chain]
+        else:
+            names = list(entry.collected.rows)
+        for name in names:
+            if name not in rows:
+                rows[name] = entry.collected.rows[name]
+                origin['pose' if role == 'pose' else name] = entry.topic.name
+        if not names and role in ('wheels', 'pose'):
+            seen = ', '.join(sorted(entry.collected.seen)) or 'nothing'
+            notes.append(f'no {role} in {entry.topic.name}: it holds {seen}')
+    if not rows:
+        raise RecordingError('; '.join([
+            'no message of use: commands, wheels, imu or pose', *notes,
+            f'there are {listing(present)}']))
+    times, repairs = common_clock({name: entry.stamps() for name, entry in rows.items()})
+    notes += repairs
+    start_ns = min(int(stamps.min()) for stamps in times.values())
+    samples = {
+        name: clean(name, np.float64(1e-9) * (times[name] - start_ns), entry.array(), notes)
+        for name, entry in rows.items()}
+    streams, sources = _streams(samples, chain, origin, notes)
+    if not streams:
+        raise RecordingError('; '.join(['no sample of use', *notes]))
+    return Recording(
+        name=path.stem if path.suffix in SUFFIXES else path.resolve().name,
+        path=str(path),
+        streams=streams,
+        start_ns=start_ns,
+        topics=sources,
+        frames=(chain[0][0], chain[-1][1]) if chain else ('', ''),
+        present={topic.name: topic.kind for topic in present},
+        notes=tuple(notes))
+
+
+def _streams(
+    samples: Mapping[str, Sample], chain: tuple[Edge, ...], origin: Mapping[str, str],
+    notes: list[str],
+) -> tuple[dict[str, TimeSeries], dict[str, str]]:
+    """Make the streams of a recording from cleaned samples, in the order of CHANNELS."""
+    made: dict[str, Sample] = {}
+    sources: dict[str, str] = {}
+    for name in ('command', 'imu', 'voltage'):
+        if name in samples:
+            made[name], sources[name] = samples[name], origin[name]
+    if 'wheels' in samples:
+        for name, sample in wheel_streams(*samples['wheels'], notes).items():
+            made[name], sources[name] = sample, origin['wheels']
+    if 'current_left' in samples and 'current_right' in samples:
+        made['currents'] = joined(samples['current_left'], samples['current_right'])
+        sources['currents'] = ' '.join(dict.fromkeys(
+            (origin['current_left'], origin['current_right'])))
+    elif 'current_left' in samples or 'current_right' in samples:
+        notes.append('current of one side only: left out')
+    if chain:
+        ways = {edge: samples[edge_name(*edge)] for edge in chain}
+        if all(way[0].size for way in ways.values()):
+            made['pose'], sources['pose'] = compose(chain, _unwrapped(chain, ways)), origin['pose']
+    kept = [name for name in CHANNELS if name in made and made[name][0].size]
+    return ({name: TimeSeries(made[name][0], made[name][1], CHANNELS[name]) for name in kept},
+            {name: sources[name] for name in kept})
+
+
+def _unwrapped(chain: Iterable[Edge], ways: Mapping[Edge, Sample]) -> dict[Edge, Sample]:
+    result: dict[Edge, Sample] = {}
+    for edge in chain:
+        times, values = ways[edge]
+        result[edge] = times, np.column_stack((values[:, :2], np.unwrap(values[:, 2])))
+    return result

@@ -1,0 +1,138 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A rosbag2 with the Husky's topics, written whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import heapq
+from os import PathLike, replace
+from pathlib import Path
+import tempfile
+from typing import TYPE_CHECKING
+
+from lg_husky_sim.errors import MissingExtraError, RecordingError
+from lg_husky_sim.recording.messages import Messages
+from lg_husky_sim.recording.recording import check_stream
+from lg_husky_sim.signals import FloatArray, TimeSeries
+import numpy as np
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+
+STORAGES = ('mcap', 'sqlite3')
+START_NS = 1_700_000_000_000_000_000
+"""Time zero of a recording that was never made on a clock; not 0, for a zero stamp means none."""
+
+
+def write_recording(
+    path: str | PathLike[str],
+    streams: Mapping[str, TimeSeries],
+    *,
+    storage: str = 'mcap',
+    start_ns: int = START_NS,
+    frames: tuple[str, str] = ('odom', 'base_link'),
+    overwrite: bool = False,
+) -> Path:
+    """
+    Write a rosbag2.
+
+    Streams go to ``/husky_velocity_controller/cmd_vel`` (TwistStamped), ``/joint_states`` (four
+    wheels), ``/imu_um7/data``, ``/tf``, ``/left_driver_current``, ``/right_driver_current`` and
+    ``/battery_state``. The bag appears at `path` complete, or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+        Folder to make.
+    streams : mapping of str to TimeSeries
+        Some of ``recording.CHANNELS``, times [s] since `start_ns`. Angles and torques of the
+        wheels are interpolated at the stamps of ``wheels``.
+    storage : str
+        ``mcap`` or ``sqlite3``.
+    start_ns : int
+        Time zero [ns].
+    frames : tuple of str
+        Parent and child frame of the pose.
+    overwrite : bool
+        Replace a rosbag2 that is at `path`; anything else there is never touched.
+
+    Returns
+    -------
+    pathlib.Path
+        The folder.
+
+    Raises
+    ------
+    RecordingError
+        If something is at `path` already, a stream is unknown or the storage is.
+    MissingExtraError
+        If the package `rosbags` is not installed.
+    """
+    target = Path(path)
+    if storage not in STORAGES:
+        raise RecordingError(f'storage {storage!r} is unknown; there are {", ".join(STORAGES)}')
+    for name, series in streams.items():
+        check_stream(name, series)
+    check_target(target, overwrite=overwrite)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=target.parent) as scratch:
+        made = Path(scratch) / target.name  # files inside a bag carry the bag's name
+        _write(made, streams, storage, start_ns, frames)
+        if target.exists():
+            check_target(target, overwrite=overwrite)
+            replace(target, Path(scratch) / 'previous')
+        replace(made, target)
+    return target
+
+
+def check_target(path: Path, *, overwrite: bool = False) -> None:
+    """
+    Check that a bag may be written at a path.
+
+    Raises
+    ------
+    RecordingError
+        If something is there, unless it is a rosbag2 and `overwrite` is set.
+    """
+    if not path.exists() and not path.is_symlink():
+        return
+    if not overwrite:
+        raise RecordingError(f'{path} exists already; choose another name or remove it')
+    if not (path.is_dir() and (path / 'metadata.yaml').is_file()):
+        raise RecordingError(f'{path} exists and is no rosbag2; it is not overwritten')
+
+
+def _write(
+    path: Path, streams: Mapping[str, TimeSeries], storage: str, start_ns: int,
+    frames: tuple[str, str],
+) -> None:
+    try:
+        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.typesys import get_typestore, Stores
+    except ImportError as error:
+        raise MissingExtraError(
+            'writing recordings needs the package rosbags: pip install rosbags') from error
+    store = get_typestore(Stores.ROS2_JAZZY)
+    plugin = StoragePlugin.MCAP if storage == 'mcap' else StoragePlugin.SQLITE3
+    with Writer(path, version=9, storage_plugin=plugin) as writer:
+        makers = Messages(store, frames).makers(streams)
+        connections: list[Connection] = [
+            writer.add_connection(topic, kind, typestore=store) for topic, kind, _, _ in makers]
+        rows = [_rows(place, times, start_ns) for place, (_, _, times, _) in enumerate(makers)]
+        for stamp, place, index in heapq.merge(*rows):
+            _, kind, _, make = makers[place]
+            raw = store.serialize_cdr(make(index, stamp), kind)
+            writer.write(connections[place], stamp, raw)
+
+
+def _rows(place: int, times: FloatArray, start_ns: int) -> Iterator[tuple[int, int, int]]:
+    """Yield (stamp [ns], place of the topic, place of the sample) in order of time."""
+    stamps = start_ns + np.round(times * 1e9).astype(np.int64)
+    if stamps.size and stamps[0] <= 0:
+        raise RecordingError(
+            f'time {times[0]:g} s before a start of {start_ns} ns gives a stamp that is not '
+            'positive')
+    for index, stamp in enumerate(stamps.tolist()):
+        yield stamp, place, index
+
