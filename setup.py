@@ -45,6 +45,7 @@ EXTRAS['dev'] = [
     'types-PyYAML',
     'types-tqdm',
 ]
+EXTRAS['check'] = [*EXTRAS['all'], *EXTRAS['dev']]
 
 
 def files_of(folder):

@@ -1,0 +1,27 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Print the closing line of ./check from pytest's JUnit report: N passed, N failed, N skipped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import sys
+from xml.etree import ElementTree
+
+
+def closing_line(report: str, failed_steps: int) -> str:
+    """Count the tests of a JUnit report; without one, the failed steps are all there is."""
+    if not report.strip():
+        return f'0 passed, {failed_steps} failed'
+    suites = list(ElementTree.fromstring(report).iter('testsuite'))  # noqa: S314 (our own file)
+    total, bad, skipped = (
+        sum(int(suite.get(key, 0)) for key in keys for suite in suites)
+        for keys in (('tests',), ('failures', 'errors'), ('skipped',))
+    )
+    # A linter that failed is no test, but the line must not read as if all were well.
+    failed = bad if bad else failed_steps
+    return f'{total - bad - skipped} passed, {failed} failed, {skipped} skipped'
+
+
+if __name__ == '__main__':
+    print(closing_line(Path(sys.argv[1]).read_text(encoding='utf-8'), int(sys.argv[2])))
