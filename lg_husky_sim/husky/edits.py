@@ -1,0 +1,253 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Each effect of the catalogue as an edit: of the graph, of the command stage or of the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.linear_graph import Branch, Characteristic, Domain, Kind, LinearGraph
+from lg_husky_sim.husky.laws import Law
+
+#: A coefficient of a law: a number, or an expression in the names of the parameters.
+Coefficient = str | float
+
+
+@dataclass(frozen=True)
+class LawRow:
+    """
+    The law that one modulated source of the graph follows.
+
+    Parameters
+    ----------
+    law : Law
+    coefficients : tuple
+        Numbers, or expressions in the names of the parameters, in the law's order.
+    """
+
+    law: Law
+    coefficients: tuple[Coefficient, ...]
+
+
+@dataclass(frozen=True)
+class EditedNetwork:
+    """
+    A graph with what the effects have changed in and around it.
+
+    Parameters
+    ----------
+    graph : LinearGraph
+    laws : mapping of str to LawRow
+        By the name of the modulated source.
+    command : mapping of str to expression
+        Entries of the command stage (latency, slew_forward, ...).
+    sensors : mapping of str to expression
+        Entries of the sensor model (gyro_bias, ...).
+    speed_loop : bool
+        Whether the base closes a wheel-speed loop.
+    """
+
+    graph: LinearGraph
+    laws: Mapping[str, LawRow] = field(default_factory=dict)
+    command: Mapping[str, str] = field(default_factory=dict)
+    sensors: Mapping[str, str] = field(default_factory=dict)
+    speed_loop: bool = False
+
+    def changing(self, command: Mapping[str, str] | None = None,
+                 sensors: Mapping[str, str] | None = None) -> EditedNetwork:
+        """Return this network with entries of the command stage or the sensors changed."""
+        return replace(self, command={**self.command, **(command or {})},
+                       sensors={**self.sensors, **(sensors or {})})
+
+    def with_values(self, values: Mapping[str, str]) -> EditedNetwork:
+        """Return this network with other value expressions on branches or two-ports."""
+        graph = self.graph
+        for name, value in values.items():
+            graph = graph.replacing(replace(graph.element(name), value=value))
+        return replace(self, graph=graph)
+
+    def with_force(self, name: str, domain: Domain, node: str, ground: str, row: LawRow,
+                   of: tuple[str, ...]) -> EditedNetwork:
+        """Return this network with a modulated through-source pushing into a node."""
+        source = Branch(name, Kind.THROUGH_SOURCE, domain, ground, node,
+                        characteristic=_characteristic(row, of))
+        return replace(self, graph=self.graph.with_branches(source),
+                       laws={**self.laws, name: row})
+
+    def with_voltage(self, effect: str, number: str, row: LawRow, of: tuple[str, ...]
+                     ) -> EditedNetwork:
+        """Return this network with a modulated across-source in series with a motor's supply."""
+        winding = self.graph.branch(f'R_{number}')
+        node = f'{winding.tail}_{effect}'
+        name = f'E_{effect}_{number}'
+        source = Branch(name, Kind.ACROSS_SOURCE, Domain.ELECTRICAL, node, winding.tail,
+                        characteristic=_characteristic(row, of))
+        graph = self.graph.replacing(replace(winding, tail=node)).with_branches(source)
+        return replace(self, graph=graph, laws={**self.laws, name: row})
+
+    def with_slip_torque(self, name: str, wheel: str, row: LawRow) -> EditedNetwork:
+        """Return this network with a modulated through-source beside a wheel's slip element."""
+        slip = self.graph.branch(f'B_{wheel}')
+        source = Branch(name, Kind.THROUGH_SOURCE, slip.domain, slip.tail, slip.head,
+                        characteristic=_characteristic(row, (f'omega(B_{wheel})',)))
+        return replace(self, graph=self.graph.with_branches(source),
+                       laws={**self.laws, name: row})
+
+
+def _characteristic(row: LawRow, of: tuple[str, ...]) -> Characteristic:
+    return Characteristic(row.law.name.lower(), of,
+                          tuple(str(c) for c in row.coefficients))
+
+
+_MOTORS = (('1', 'L', '2'), ('2', 'R', '1'))
+_WHEELS = {'left': ('FL', 'RL'), 'right': ('FR', 'RR')}
+_LETTER = {'left': ('L',), 'right': ('R',), 'both': ('L', 'R')}
+
+
+def _axles(network: EditedNetwork, effect: Effect) -> list[tuple[str, Branch]]:
+    # Side letter and inertia on the motor's axle, for the effect's side.
+    names = {branch.name for branch in network.graph.branches}
+    return [(letter, network.graph.branch(
+        f'J_{letter}W' if f'J_{letter}W' in names else f'J_R{letter}'))
+        for letter in _LETTER[effect.side]]
+
+
+def _electrical(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    for number, letter, other in _MOTORS:
+        axle = _axles(network, Effect('coulomb_drivetrain', 'both'))['LR'.index(letter)][1].name
+        side = float('LR'.index(letter))
+        voltage, current = f'V(V_S{number})', f'i(L_{number})'
+        transmission = 'torque_constant*gear_ratio'
+        rows: dict[str, tuple[Law, tuple[Coefficient, ...], tuple[str, ...]]] = {
+            'battery_sag': (Law.BUS_SAG, ('bus_resistance', 'supply_voltage'),
+                            (voltage, f'V(V_S{other})', current, f'i(L_{other})')),
+            'battery_droop': (Law.DROOP, ('droop_rate', 'droop_floor'), (voltage,)),
+            'current_limit': (Law.CURRENT_LIMIT,
+                              ('current_limit', 'motor_resistance', transmission),
+                              (voltage, f'omega({axle})')),
+            'voltage_saturation': (Law.CLIP, ('clip_voltage',), (voltage,)),
+            'motor_heating': (Law.HEATING, ('heating_rate', 'cooling_time', side), (current,)),
+            'driver_deadband': (
+                (Law.DEAD_ZONE, ('dead_voltage',), (voltage,)) if effect.shape == 'zone' else
+                (Law.DEAD_BAND, ('dead_voltage', 'dead_edge'), (voltage,))),
+        }
+        law, coefficients, of = rows[effect.id]
+        network = network.with_voltage(effect.id, number, LawRow(law, coefficients), of)
+    return network
+
+
+def _drivetrain(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    if effect.id == 'belt_compliance':
+        names = {branch.name for branch in network.graph.branches}
+        if 'K_BeltL' not in names:
+            raise ParameterError(
+                'effect belt_compliance needs the expanded drivetrain (structure.drivetrain)')
+        return network
+    if effect.id == 'viscous_asymmetry':
+        if effect.shape == 'slip':
+            return network.with_values({
+                f'B_{wheel}': 'wheel_damping*(1+damping_change)'
+                for wheel in _WHEELS[effect.side]})
+        letter, inertia = _axles(network, effect)[0]
+        bearing = Branch(f'B_bearing_{letter}', Kind.D_TYPE, inertia.domain, inertia.tail,
+                         inertia.head, 'extra_damping')
+        return replace(network, graph=network.graph.with_branches(bearing))
+    for letter, inertia in _axles(
+            network, replace(effect, side='both') if effect.id == 'gear_backlash' else effect):
+        number, side = ('1', 0.0) if letter == 'L' else ('2', 1.0)
+        rate = f'omega({inertia.name})'
+        rows: dict[str, tuple[Law, tuple[Coefficient, ...], tuple[str, ...]]] = {
+            'coulomb_drivetrain': (Law.COULOMB, ('dry_torque', 'dry_speed', 0.0, 1.0), (rate,)),
+            'torque_ripple': (Law.WHEEL_PHASE, ('ripple_cos', 'ripple_sin', side), ()),
+            'gear_backlash': (Law.BACKLASH, ('play', 'torque_constant*gear_ratio', side),
+                              (f'V(V_S{number})', rate, f'i(L_{number})')),
+        }
+        law, coefficients, of = rows[effect.id]
+        network = network.with_force(f'T_{effect.id}_{letter}', inertia.domain, inertia.tail,
+                                     inertia.head, LawRow(law, coefficients), of)
+    return network
+
+
+def _traction(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    if effect.id == 'traction_saturation':
+        for wheel in (*_WHEELS['left'], *_WHEELS['right']):
+            damping = network.graph.branch(f'B_{wheel}').value
+            row = LawRow(Law.SLIP_SATURATION, ('traction_torque', str(damping)))
+            network = network.with_slip_torque(f'T_slip_{wheel}', wheel, row)
+        return network
+    numbers = range(1, 5) if effect.side == 'left' else range(5, 9)
+    return network.with_values({
+        f'TF_{n}': str(network.graph.two_port(f'TF_{n}').value).replace(
+            'wheel_radius', '(wheel_radius*(1+radius_change))') for n in numbers})
+
+
+def _chassis(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    if effect.id == 'payload':
+        return network.with_values({'M_H': 'mass+payload_mass',
+                                    'J_H': 'yaw_inertia+payload_inertia'})
+    if effect.id == 'terrain_change':
+        changed = {f'B_{wheel}': f'({network.graph.branch(f"B_{wheel}").value})'
+                   '*(1+wheel_damping_change)' for side in _WHEELS for wheel in _WHEELS[side]}
+        changed['B_H'] = f'({network.graph.branch("B_H").value})*(1+yaw_damping_change)'
+        return network.with_values(changed)
+    forward, yaw = 'v(M_H)', 'omega(J_H)'
+    rows: dict[str, tuple[Law, tuple[Coefficient, ...], tuple[str, ...]]] = {
+        'slope': (Law.HEADING, ('slope_x', 'slope_y'), ()),
+        'rolling_resistance': (Law.COULOMB, ('rolling_force', 'rolling_speed', 0.0, 1.0),
+                               (forward,)),
+        'quadratic_drag': (Law.QUADRATIC, ('drag',), (forward,)),
+        'yaw_scrub_coulomb': (Law.COULOMB, ('yaw_coulomb_moment', 'yaw_coulomb_rate', 0.0, 1.0),
+                              (yaw,)),
+        'yaw_scrub_speed': (Law.MODULATED_DAMPING, ('scrub_slope',), (yaw, forward)),
+        'yaw_pull': (Law.WHILE_MOVING, ('pull_moment', 'pull_speed'), (forward,)),
+    }
+    law, coefficients, of = rows[effect.id]
+    mass = network.graph.branch('M_H' if effect.kind.subsystem.value == 'translation' else 'J_H')
+    return network.with_force(f'F_{effect.id}', mass.domain, mass.tail, mass.head,
+                              LawRow(law, coefficients), of)
+
+
+def _command(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    if effect.id == 'speed_loop':
+        return replace(network, speed_loop=True)
+    return network.changing(command={
+        p.name: p.name for p in effect.parameters() if not p.fixed})
+
+
+def _sensor(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    if effect.id == 'encoder_scale':
+        return network.changing(sensors={f'encoder_{effect.side}': 'encoder_factor'})
+    if effect.id == 'sensor_time_offset':
+        return network.changing(sensors={f'delay_{effect.shape}': 'stamp_delay'})
+    return network.changing(sensors={p.name: p.name for p in effect.parameters()})
+
+
+_BY_SUBSYSTEM: Mapping[str, Callable[[EditedNetwork, Effect], EditedNetwork]] = {
+    'electrical': _electrical, 'drivetrain': _drivetrain, 'traction': _traction,
+    'translation': _chassis, 'rotation': _chassis, 'command': _command, 'sensor': _sensor,
+}
+
+
+def edit(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    """
+    Put an effect into a network.
+
+    Parameters
+    ----------
+    network : EditedNetwork
+    effect : Effect
+
+    Returns
+    -------
+    EditedNetwork
+        With new elements, changed values, command stage or sensors.
+
+    Raises
+    ------
+    ParameterError
+        If the effect does not fit the network.
+    """
+    return _BY_SUBSYSTEM[effect.kind.subsystem.value](network, effect)

@@ -1,0 +1,225 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The catalogue of physics that the nominal graph leaves out, as values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import difflib
+import enum
+from functools import cache
+from typing import Any
+
+import yaml
+
+from lg_husky_sim.errors import ModelFileError, ParameterError
+from lg_husky_sim.husky.parameters import Parameter
+from lg_husky_sim.resources import config_path
+
+
+class Subsystem(enum.Enum):
+    """Part of the robot that an effect belongs to."""
+
+    ELECTRICAL = 'electrical'
+    COMMAND = 'command'
+    DRIVETRAIN = 'drivetrain'
+    TRACTION = 'traction'
+    TRANSLATION = 'translation'
+    ROTATION = 'rotation'
+    SENSOR = 'sensor'
+
+
+class OnsetKind(enum.Enum):
+    """What switches a late effect on."""
+
+    TIME = 'time'
+    PLACE_ABOVE = 'place_above'
+    PLACE_BELOW = 'place_below'
+
+
+@dataclass(frozen=True)
+class Onset:
+    """
+    When or where an effect begins.
+
+    Parameters
+    ----------
+    kind : OnsetKind
+    value : float
+        Time in a recording [s], or x in the world [m].
+    recording : str
+        Name of the recording in which it begins; empty for "in each".
+    """
+
+    kind: OnsetKind
+    value: float
+    recording: str = ''
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """
+    One number of an effect.
+
+    Parameters
+    ----------
+    name : str
+    unit : str
+    lower, upper : float
+        Bounds [unit].
+    starts : tuple of float
+        Sizes from which an estimation begins [unit].
+    source : str
+    fixed : bool
+        A smoothing or shape constant that is not estimated.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    starts: tuple[float, ...]
+    source: str
+    fixed: bool = False
+
+    def parameter(self, value: float | None = None) -> Parameter:
+        """Return it as a parameter with ``value``, or with its first start."""
+        return Parameter(self.name, self.starts[0] if value is None else value, self.unit,
+                         self.lower, self.upper, self.source, tolerance=10.0,
+                         free=not self.fixed)
+
+
+@dataclass(frozen=True)
+class EffectKind:
+    """
+    One entry of the catalogue.
+
+    Parameters
+    ----------
+    id : str
+        Name on the interface.
+    subsystem : Subsystem
+    title : str
+        What it is, in words.
+    elements : tuple of str
+        Elements of the graph that it touches.
+    parameters : tuple of EffectParameter
+    sides, shapes : tuple of str
+        Sides it can act on and forms it can take; the first is the default.
+    needs_onset : bool
+        Whether it only makes sense with an onset.
+    """
+
+    id: str
+    subsystem: Subsystem
+    title: str
+    elements: tuple[str, ...]
+    parameters: tuple[EffectParameter, ...]
+    sides: tuple[str, ...] = ('none',)
+    shapes: tuple[str, ...] = ('',)
+    needs_onset: bool = False
+
+
+@dataclass(frozen=True)
+class Effect:
+    """
+    An effect of the catalogue, applied to a structure.
+
+    Parameters
+    ----------
+    id : str
+        Entry of the catalogue.
+    side : str
+        ``none``, ``both``, ``left`` or ``right``.
+    shape : str
+        Variant of form; empty where there is one only.
+    late : bool
+        Whether it begins at the structure's onset instead of being there always.
+
+    Raises
+    ------
+    ParameterError
+        If the id, side or shape is unknown.
+    """
+
+    id: str
+    side: str = ''
+    shape: str = ''
+    late: bool = False
+
+    def __post_init__(self) -> None:
+        """Fill defaults and check against the catalogue."""
+        kind = effect_kind(self.id)
+        if not self.side:
+            object.__setattr__(self, 'side', kind.sides[0])
+        if not self.shape:
+            object.__setattr__(self, 'shape', kind.shapes[0])
+        for what, value, allowed in (('side', self.side, kind.sides),
+                                     ('shape', self.shape, kind.shapes)):
+            if value not in allowed:
+                raise ParameterError(
+                    f'{what} {value!r} of effect {self.id} is not one of {", ".join(allowed)}')
+
+    @property
+    def kind(self) -> EffectKind:
+        """Entry of the catalogue."""
+        return effect_kind(self.id)
+
+    def parameters(self) -> tuple[EffectParameter, ...]:
+        """Return the numbers that this side and shape have."""
+        unused = {('command_slew', 'forward'): 'slew_yaw',
+                  ('command_slew', 'yaw'): 'slew_forward',
+                  ('command_limit', 'forward'): 'limit_yaw',
+                  ('command_limit', 'yaw'): 'limit_forward',
+                  ('viscous_asymmetry', 'slip'): 'extra_damping',
+                  ('viscous_asymmetry', 'bearing'): 'damping_change',
+                  ('driver_deadband', 'zone'): 'dead_edge'}.get((self.id, self.shape))
+        return tuple(p for p in self.kind.parameters if p.name != unused)
+
+
+def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
+    parameters = tuple(
+        EffectParameter(key, str(p['unit']), float(p['lower']), float(p['upper']),
+                        tuple(float(s) for s in p['starts']), str(p['source']),
+                        bool(p.get('fixed', False)))
+        for key, p in entry['parameters'].items())
+    return EffectKind(
+        name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),
+        parameters, tuple(entry.get('sides', ('none',))), tuple(entry.get('shapes', ('',))),
+        entry.get('onset') == 'required')
+
+
+@cache
+def catalogue() -> Mapping[str, EffectKind]:
+    """
+    Return the catalogue of ``config/effects.yaml`` by id.
+
+    Raises
+    ------
+    ModelFileError
+        If the file is not a catalogue.
+    """
+    path = config_path('effects.yaml')
+    with open(path, encoding='utf-8') as stream:
+        data = yaml.safe_load(stream)
+    if not isinstance(data, dict) or data.get('schema') != 'lg_husky_sim/effects/1':
+        raise ModelFileError(f'{path}: not a catalogue of effects (schema lg_husky_sim/effects/1)')
+    return {name: _read_kind(name, entry) for name, entry in data['effects'].items()}
+
+
+def effect_kind(name: str) -> EffectKind:
+    """
+    Return one entry of the catalogue.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that id; a near one is suggested.
+    """
+    known = catalogue()
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f'; did you mean {near[0]}?' if near else ''
+        raise ParameterError(f'unknown effect {name!r}{hint} (known: {", ".join(known)})')
+    return known[name]

@@ -1,0 +1,184 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The non-linear laws f(z) that a modulated source of the graph may follow.
+
+Each effort of a plant is one row: the number of its law, up to ``WIDTH`` coefficients, and the
+place where its arguments begin in ``z``. One interpreter evaluates all rows, so that a new set of
+efforts needs no new machine code. ``context`` holds what is not in the graph:
+[time, heading, x, y, angle_left, angle_right]. ``memory`` holds four accumulators:
+[heat_left, heat_right, gap_left, gap_right].
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+
+from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.jit import jit
+
+#: Coefficients that a row can hold.
+WIDTH = 24
+#: Length of the context vector: time, heading, x, y, angle_left, angle_right.
+CONTEXT = 6
+#: Length of the memory vector: heat of both motors, play of both gears.
+MEMORY = 4
+
+
+class Law(enum.IntEnum):
+    """
+    Laws of an effort; z are its arguments, p its coefficients.
+
+    The value is what the source adds: a through-source pushes into its node, an across-source
+    adds to the source it stands in series with.
+    """
+
+    COULOMB = 0
+    """f = -p0 (1 + p2 exp(-(z0/p3)^2)) tanh(z0/p1): dry friction, Stribeck share p2."""
+    QUADRATIC = 1
+    """f = -p0 z0 |z0|."""
+    WHILE_MOVING = 2
+    """f = p0 tanh(|z0|/p1): constant while z0 is not zero."""
+    MODULATED_DAMPING = 3
+    """f = -p0 |z1| z0."""
+    HEADING = 4
+    """f = p0 cos(heading) + p1 sin(heading)."""
+    WHEEL_PHASE = 5
+    """f = p0 cos(angle) + p1 sin(angle); p2 is 0 for the left wheel, 1 for the right."""
+    SLIP_SATURATION = 6
+    """f = p0 tanh(p1 z0/p0) - p1 z0: turns damping p1 into a force that saturates at p0."""
+    CURRENT_LIMIT = 7
+    """f = clip(z0, p2 z1 - p1 p0, p2 z1 + p1 p0) - z0: voltage that holds |i| <= p0."""
+    DEAD_ZONE = 8
+    """f = sgn(z0) max(|z0| - p0, 0) - z0."""
+    DEAD_BAND = 9
+    """f = -z0 inside |z0| < p0 and 0 outside (edge of width p1)."""
+    CLIP = 10
+    """f = clip(z0, -p0, p0) - z0."""
+    BUS_SAG = 11
+    """f = -(z0/p1) p0 (z0 z2 + z1 z3)/p1: averaged bridge on a bus of resistance p0."""
+    DROOP = 12
+    """f = -z0 min(p0 time, p1)."""
+    HEATING = 13
+    """f = -p0 heat z0, heat' = z0^2 - heat/p1; p2 is 0 (left) or 1 (right)."""
+    BACKLASH = 14
+    """f = -p1 z2 while the play p0 is being crossed at the rate z0/p1 - z1; p2 is the side."""
+    TABLE = 15
+    """f = table over [p1, p2] with p3 knots p4..., of context p0 >= 0 or of z0 if p0 < 0."""
+
+
+@jit
+def _table(p: FloatArray, argument: float) -> float:
+    knots = int(p[3])
+    place = (argument - p[1]) / (p[2] - p[1]) * (knots - 1)
+    if place <= 0.0:
+        return float(p[4])
+    if place >= knots - 1:
+        return float(p[4 + knots - 1])
+    left = int(place)
+    share = place - left
+    return float(p[4 + left] * (1.0 - share) + p[5 + left] * share)
+
+
+@jit
+def _clip(value: float, lower: float, upper: float) -> float:
+    return max(lower, min(upper, value))
+
+
+@jit
+def _source_law(law: int, p: FloatArray, z: FloatArray, o: int, memory: FloatArray,
+                time: float) -> float:
+    # Laws of the electrical side: what the driver adds to its own voltage.
+    if law == 7:
+        return _clip(z[o], p[2] * z[o + 1] - p[1] * p[0],
+                     p[2] * z[o + 1] + p[1] * p[0]) - z[o]
+    if law == 8:
+        return math.copysign(max(abs(z[o]) - p[0], 0.0), z[o]) - z[o]
+    if law == 9:
+        return -z[o] * 0.5 * (1.0 - math.tanh((abs(z[o]) - p[0]) / p[1]))
+    if law == 10:
+        return _clip(z[o], -p[0], p[0]) - z[o]
+    if law == 11:
+        return -z[o] / p[1] * p[0] * (z[o] * z[o + 2] + z[o + 1] * z[o + 3]) / p[1]
+    if law == 12:
+        return -z[o] * min(p[0] * max(time, 0.0), p[1])
+    if law == 13:
+        return -p[0] * memory[int(p[2])] * z[o]
+    play = memory[2 + int(p[2])]
+    if abs(play) < 0.5 * p[0]:
+        return -p[1] * z[o + 2]
+    return 0.0
+
+
+@jit
+def evaluate(laws: FloatArray, coefficients: FloatArray, offsets: FloatArray, z: FloatArray,
+             context: FloatArray, memory: FloatArray, out: FloatArray) -> None:
+    """
+    Evaluate every effort.
+
+    Parameters
+    ----------
+    laws : numpy.ndarray of int64, shape (n_efforts,)
+        Numbers of :class:`Law`.
+    coefficients : numpy.ndarray, shape (n_efforts, WIDTH)
+    offsets : numpy.ndarray of int64, shape (n_efforts,)
+        Where the arguments of each effort begin in ``z``.
+    z : numpy.ndarray, shape (n_arguments,)
+    context : numpy.ndarray, shape (CONTEXT,)
+    memory : numpy.ndarray, shape (MEMORY,)
+    out : numpy.ndarray, shape (n_efforts,)
+        Receives the efforts.
+    """
+    for j in range(laws.size):
+        law = laws[j]
+        p = coefficients[j]
+        o = offsets[j]
+        if law == 0:
+            level = p[0]
+            if p[2] != 0.0:
+                level *= 1.0 + p[2] * math.exp(-(z[o] / p[3]) ** 2)
+            out[j] = -level * math.tanh(z[o] / p[1])
+        elif law == 1:
+            out[j] = -p[0] * z[o] * abs(z[o])
+        elif law == 2:
+            out[j] = p[0] * math.tanh(abs(z[o]) / p[1])
+        elif law == 3:
+            out[j] = -p[0] * abs(z[o + 1]) * z[o]
+        elif law == 4:
+            out[j] = p[0] * math.cos(context[1]) + p[1] * math.sin(context[1])
+        elif law == 5:
+            angle = context[4 + int(p[2])]
+            out[j] = p[0] * math.cos(angle) + p[1] * math.sin(angle)
+        elif law == 6:
+            out[j] = p[0] * math.tanh(p[1] * z[o] / p[0]) - p[1] * z[o]
+        elif law == 15:
+            selector = int(p[0])
+            out[j] = _table(p, z[o] if selector < 0 else context[selector])
+        else:
+            out[j] = _source_law(law, p, z, o, memory, context[0])
+
+
+@jit
+def remember(laws: FloatArray, coefficients: FloatArray, offsets: FloatArray, z: FloatArray,
+             memory: FloatArray, step: float) -> None:
+    """
+    Advance the memories (motor heat, gear play) by ``step`` [s].
+
+    Parameters
+    ----------
+    laws, coefficients, offsets, z, memory
+        As in :func:`evaluate`; ``memory`` is changed.
+    step : float
+        Time [s].
+    """
+    for j in range(laws.size):
+        p = coefficients[j]
+        o = offsets[j]
+        if laws[j] == 13:
+            side = int(p[2])
+            memory[side] += step * (z[o] * z[o] - memory[side] / p[1])
+        elif laws[j] == 14:
+            side = 2 + int(p[2])
+            half = 0.5 * p[0]
+            memory[side] = _clip(memory[side] + step * (z[o] / p[1] - z[o + 1]), -half, half)

@@ -1,0 +1,219 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which physics is in, derived once; numbers put in often."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+import enum
+from functools import lru_cache
+
+import numpy as np
+
+from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.husky import network
+from lg_husky_sim.husky.edits import Coefficient, EditedNetwork, edit
+from lg_husky_sim.husky.effects import Effect, Onset
+from lg_husky_sim.husky.laws import WIDTH
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet, SensorModel
+from lg_husky_sim.husky.speed_loop import STATES as LOOP_STATES, close_speed_loop
+from lg_husky_sim.linear_graph import Expression, NumericModel, StateSpace, compile_numeric
+
+
+class Drivetrain(enum.Enum):
+    """The paper's two drivetrain graphs."""
+
+    SIMPLIFIED = 'simplified'
+    EXPANDED = 'expanded'
+
+
+@dataclass(frozen=True)
+class Structure:
+    """
+    Which physics is in.
+
+    Parameters
+    ----------
+    drivetrain : Drivetrain
+    effects : tuple of Effect
+        Applied in this order.
+    onset : Onset or None
+        When or where the late ones among the effects begin.
+
+    Raises
+    ------
+    ParameterError
+        If an effect is late and there is no onset.
+    """
+
+    drivetrain: Drivetrain = Drivetrain.SIMPLIFIED
+    effects: tuple[Effect, ...] = ()
+    onset: Onset | None = None
+
+    def __post_init__(self) -> None:
+        """Check the effects against the onset."""
+        for effect in self.effects:
+            if effect.late and self.onset is None:
+                raise ParameterError(f'effect {effect.id} is late, but there is no onset')
+
+    def with_effect(self, effect: Effect, onset: Onset | None = None) -> Structure:
+        """Return this structure with one effect more; a belt needs the expanded drivetrain."""
+        drivetrain = self.drivetrain
+        if effect.id == 'belt_compliance':
+            drivetrain = Drivetrain.EXPANDED
+        return Structure(drivetrain, (*self.effects, effect), onset or self.onset)
+
+    def network(self, late: bool = True) -> EditedNetwork:
+        """
+        Return the edited graph.
+
+        Parameters
+        ----------
+        late : bool
+            Whether the late effects are in.
+
+        Returns
+        -------
+        EditedNetwork
+        """
+        graph = network.simplified() if self.drivetrain is Drivetrain.SIMPLIFIED else (
+            network.expanded())
+        edited = EditedNetwork(graph)
+        for effect in self.effects:
+            if late or not effect.late:
+                edited = edit(edited, effect)
+        return edited
+
+
+def _outputs(edited: EditedNetwork) -> tuple[str, ...]:
+    names = {branch.name for branch in edited.graph.branches}
+    left, right = ('J_LW', 'J_RW') if 'J_LW' in names else ('J_RL', 'J_RR')
+    return (f'omega({left})', f'omega({right})', 'v(M_H)', 'omega(J_H)', 'i(L_1)', 'i(L_2)')
+
+
+def _number(coefficient: Coefficient) -> Callable[[Mapping[str, float]], float]:
+    if isinstance(coefficient, str):
+        return Expression(coefficient).evaluate
+    value = float(coefficient)
+    return lambda values: value
+
+
+class _Regime:
+    """One network, analysed; gives a :class:`PlantSet` for numbers."""
+
+    def __init__(self, edited: EditedNetwork) -> None:
+        self.edited = edited
+        self.numeric: NumericModel = compile_numeric(edited.graph, _outputs(edited))
+        rows = [edited.laws[name] for name in self.numeric.efforts]
+        self._laws = np.array([int(row.law) for row in rows], dtype=np.int64)
+        self._numbers = [[_number(c) for c in row.coefficients] for row in rows]
+        counts = [len(edited.graph.branch(name).characteristic.of)  # type: ignore[union-attr]
+                  for name in self.numeric.efforts]
+        self._offsets = np.cumsum([0, *counts], dtype=np.int64)[:-1]
+        self._volts = np.zeros((2, len(rows)))
+        for j, name in enumerate(self.numeric.efforts):
+            if name.startswith('E_'):
+                self._volts[0 if name.endswith('_1') else 1, j] = 1.0
+
+    def at(self, values: Mapping[str, float]) -> PlantSet:
+        space: StateSpace = self.numeric.at(values)
+        count = len(self._numbers)
+        coefficients = np.zeros((count, WIDTH))
+        for j, numbers in enumerate(self._numbers):
+            for i, number in enumerate(numbers):
+                coefficients[j, i] = number(values)
+        forward = space.C[2]
+        rows = np.vstack([space.C, forward @ space.A, np.zeros((2, space.A.shape[0]))])
+        rows_u = np.vstack([space.D, forward @ space.B, np.eye(2)])
+        rows_f = np.vstack([space.L_c, forward @ space.G, self._volts])
+        volts = values['supply_voltage'] * values['command_gain']
+        command = CommandStage(volts, volts * values['turn_ratio'], values['supply_voltage'])
+        command = replace(command, **{
+            name: values[key] for name, key in self.edited.command.items()})
+        sensors = SensorModel(**{
+            name: values[key] for name, key in self.edited.sensors.items()})
+        plant = PlantSet(space.A, space.B, space.G, space.H, space.K, rows, rows_u, rows_f,
+                         self._laws, self._offsets, coefficients, command, sensors)
+        return close_speed_loop(plant, values) if self.edited.speed_loop else plant
+
+
+@dataclass(frozen=True)
+class HuskyModel:
+    """
+    A structure whose equations are derived; numbers are put in by :meth:`at`.
+
+    Parameters
+    ----------
+    structure : Structure
+    regimes : tuple
+        The derived networks, without and with the late effects.
+    """
+
+    structure: Structure
+    regimes: tuple[_Regime, ...]
+
+    def at(self, parameters: Parameters) -> Plant:
+        """
+        Put numbers in.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            Must hold every name that the structure uses.
+
+        Returns
+        -------
+        Plant
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is missing.
+        """
+        try:
+            sets = tuple(regime.at(parameters) for regime in self.regimes)
+        except KeyError as error:
+            raise ParameterError(
+                f'parameter {error.args[0]!r} is missing; the structure needs it') from error
+        first = self.regimes[0]
+        states = tuple(first.numeric.states) + (LOOP_STATES if first.edited.speed_loop else ())
+        return Plant(sets, states, self.structure.onset)
+
+
+@lru_cache(maxsize=512)
+def _compiled(drivetrain: Drivetrain, effects: tuple[Effect, ...]) -> tuple[_Regime, ...]:
+    marked = Structure(drivetrain, tuple(replace(e, late=False) for e in effects))
+    regimes = [_Regime(marked.network())]
+    if any(effect.late for effect in effects):
+        early = Structure(drivetrain, tuple(e for e in effects if not e.late))
+        regimes.insert(0, _Regime(early.network()))
+        if len(regimes[0].numeric.states) != len(regimes[1].numeric.states) or (
+                regimes[0].edited.speed_loop != regimes[1].edited.speed_loop):
+            raise ParameterError(
+                'a late effect may not add states: belt_compliance and speed_loop are always on')
+    return tuple(regimes)
+
+
+def compile_model(structure: Structure) -> HuskyModel:
+    """
+    Derive the equations of a structure.
+
+    Parameters
+    ----------
+    structure : Structure
+
+    Returns
+    -------
+    HuskyModel
+        The graph analysis is kept for structures that differ only in the onset's value.
+
+    Raises
+    ------
+    GraphError
+        If the edited graph cannot be derived.
+    ParameterError
+        If the effects do not fit the structure.
+    """
+    return HuskyModel(structure, _compiled(structure.drivetrain, structure.effects))

@@ -1,0 +1,308 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Model files: parameters, structure and effects, as YAML that every tool reads and writes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+import os
+from pathlib import Path
+import tempfile
+from typing import Any
+
+import yaml
+
+from lg_husky_sim.errors import LgHuskyError, ModelFileError, ParameterError
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model import Drivetrain, Structure
+from lg_husky_sim.husky.parameters import Parameter, Parameters
+from lg_husky_sim.resources import config_path
+
+SCHEMA = 'lg_husky_sim/model/1'
+#: Largest model file that is read [bytes].
+LARGEST = 4_000_000
+_KEYS = {'value', 'unit', 'lower', 'upper', 'tolerance', 'free', 'source', 'low', 'high'}
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """
+    What a model file holds.
+
+    Parameters
+    ----------
+    structure : Structure
+    parameters : Parameters
+        Those of the robot and of all effects.
+    about : str
+        One line on where the model comes from.
+    """
+
+    structure: Structure
+    parameters: Parameters
+    about: str = ''
+
+
+def default_model_path() -> Path:
+    """Return the path of the packaged Husky with the paper's parameters."""
+    return config_path('husky.yaml')
+
+
+def _number(name: str, key: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ModelFileError(f'{name}: {key} = {value!r} is not a number')
+    if not math.isfinite(value):
+        raise ModelFileError(f'{name}: {key} = {value} is not finite')
+    return float(value)
+
+
+def _mapping(what: str, value: object) -> dict[str, Any]:
+    if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
+        raise ModelFileError(f'{what} is not a mapping of names')
+    return value
+
+
+def _parameter(name: str, entry: object) -> Parameter:
+    data = _mapping(f'parameter {name}', entry)
+    unknown = sorted(set(data) - _KEYS)
+    if unknown:
+        raise ModelFileError(
+            f'parameter {name}: unknown key {unknown[0]!r} (allowed: {", ".join(sorted(_KEYS))})')
+    for key in ('value', 'unit', 'lower', 'upper', 'source'):
+        if key not in data:
+            raise ModelFileError(f'parameter {name}: {key} is missing')
+    free = data.get('free', False)
+    if not isinstance(free, bool):
+        raise ModelFileError(f'parameter {name}: free = {free!r} is neither true nor false')
+    interval = [None if data.get(key) is None else _number(name, key, data[key])
+                for key in ('low', 'high')]
+    return Parameter(
+        name, _number(name, 'value', data['value']), str(data['unit']),
+        _number(name, 'lower', data['lower']), _number(name, 'upper', data['upper']),
+        str(data['source']), _number(name, 'tolerance', data.get('tolerance', 0.0)), free,
+        *interval)
+
+
+def _effect(index: int, entry: object, shared: set[str]
+            ) -> tuple[Effect, tuple[Parameter, ...]]:
+    data = _mapping(f'effect {index + 1}', entry)
+    unknown = sorted(set(data) - {'effect', 'side', 'shape', 'late', 'parameters'})
+    if unknown:
+        raise ModelFileError(f'effect {index + 1}: unknown key {unknown[0]!r}')
+    late = data.get('late', False)
+    if not isinstance(late, bool):
+        raise ModelFileError(f'effect {index + 1}: late = {late!r} is neither true nor false')
+    effect = Effect(str(data.get('effect', '')), str(data.get('side') or ''),
+                    str(data.get('shape') or ''), late)
+    given = _mapping(f'effect {effect.id}: parameters', data.get('parameters', {}))
+    known = {p.name: p for p in effect.parameters()}
+    parameters = []
+    for name in given:
+        if name not in known:
+            raise ModelFileError(f'effect {effect.id}: unknown parameter {name!r} '
+                                 f'(known: {", ".join(known)})')
+    for name, template in known.items():
+        if name not in given:
+            if name not in shared:
+                parameters.append(template.parameter())
+        elif isinstance(given[name], dict):
+            parameters.append(_parameter(name, given[name]))
+        else:
+            parameters.append(template.parameter(_number(name, 'value', given[name])))
+    return effect, tuple(parameters)
+
+
+def _onset(data: object) -> Onset | None:
+    if data is None:
+        return None
+    entry = _mapping('structure.onset', data)
+    kinds = [kind.value for kind in OnsetKind]
+    if entry.get('kind') not in kinds:
+        raise ModelFileError(
+            f'structure.onset.kind = {entry.get("kind")!r} is not one of {", ".join(kinds)}')
+    return Onset(OnsetKind(entry['kind']), _number('structure.onset', 'value',
+                                                   entry.get('value')),
+                 str(entry.get('recording', '')))
+
+
+def model_from_data(data: object, name: str) -> ModelFile:
+    """
+    Read a model out of parsed YAML.
+
+    Parameters
+    ----------
+    data : object
+        As ``yaml.safe_load`` gives it.
+    name : str
+        What to call it in messages.
+
+    Returns
+    -------
+    ModelFile
+
+    Raises
+    ------
+    ModelFileError
+        If something is missing, unknown or of the wrong type.
+    """
+    try:
+        content = _mapping('the file', data)
+        if content.get('schema') != SCHEMA:
+            raise ModelFileError(f'schema is {content.get("schema")!r}, expected {SCHEMA!r}')
+        unknown = sorted(set(content) - {'schema', 'about', 'structure', 'parameters', 'effects'})
+        if unknown:
+            raise ModelFileError(f'unknown key {unknown[0]!r}')
+        structure = _mapping('structure', content.get('structure', {}))
+        drivetrains = [d.value for d in Drivetrain]
+        drivetrain = structure.get('drivetrain', 'simplified')
+        if drivetrain not in drivetrains:
+            raise ModelFileError(f'structure.drivetrain = {drivetrain!r} is not one of '
+                                 f'{", ".join(drivetrains)}')
+        entries = [_parameter(key, entry) for key, entry in _mapping(
+            'parameters', content.get('parameters')).items()]
+        listed = content.get('effects') or []
+        if not isinstance(listed, list):
+            raise ModelFileError('effects is not a list')
+        shared = {p.name for p in entries}
+        effects = [_effect(i, entry, shared) for i, entry in enumerate(listed)]
+        shape = Structure(Drivetrain(drivetrain), tuple(effect for effect, _ in effects),
+                          _onset(structure.get('onset')))
+        parameters = Parameters(tuple(entries)).with_entries(
+            *(p for _, group in effects for p in group))
+        nominal = () if name == 'husky.yaml' else packaged_parameters()
+        missing = [p for p in nominal if p not in parameters]
+        if missing:
+            raise ModelFileError(f'parameter {missing[0]} is missing')
+        return ModelFile(shape, parameters, str(content.get('about', '')))
+    except LgHuskyError as error:
+        raise ModelFileError(f'{name}: {error}') from error
+
+
+def packaged_parameters() -> tuple[str, ...]:
+    """Return the names that every model must hold."""
+    return tuple(load_model(default_model_path()).parameters)
+
+
+def load_model(path: str | os.PathLike[str] | None = None) -> ModelFile:
+    """
+    Read a model file.
+
+    Parameters
+    ----------
+    path : path-like, optional
+        The packaged Husky if not given.
+
+    Returns
+    -------
+    ModelFile
+
+    Raises
+    ------
+    ModelFileError
+        If it cannot be read as a model; the message names file, thing, value and what is allowed.
+    """
+    place = Path(path) if path is not None else default_model_path()
+    try:
+        if place.stat().st_size > LARGEST:
+            raise ModelFileError(f'{place}: larger than {LARGEST} bytes, not a model file')
+        text = place.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, 'strerror', None) or 'not a text file'
+        raise ModelFileError(f'{place}: {reason}') from error
+    try:
+        data = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        line = str(error).replace('\n', ' ')[:200]
+        raise ModelFileError(f'{place}: not YAML: {line}') from error
+    name = 'husky.yaml' if place == default_model_path() else str(place)
+    return model_from_data(data, name)
+
+
+def apply_settings(model: ModelFile, settings: Mapping[str, float]) -> ModelFile:
+    """
+    Return a model with parameters overridden by name (``--set NAME=VALUE``).
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown or a value out of bounds.
+    """
+    return ModelFile(model.structure, model.parameters.replacing(settings), model.about)
+
+
+def parse_settings(pairs: tuple[str, ...]) -> dict[str, float]:
+    """
+    Read ``NAME=VALUE`` texts.
+
+    Raises
+    ------
+    ParameterError
+        If a text is not of that form.
+    """
+    settings = {}
+    for pair in pairs:
+        name, equals, value = pair.partition('=')
+        try:
+            settings[name.strip()] = float(value)
+        except ValueError:
+            equals = ''
+        if not equals or not name.strip():
+            raise ParameterError(f'--set {pair!r} is not of the form NAME=VALUE with a number')
+    return settings
+
+
+def _entry(parameter: Parameter) -> dict[str, object]:
+    data: dict[str, object] = {
+        'value': parameter.value, 'unit': parameter.unit, 'lower': parameter.lower,
+        'upper': parameter.upper, 'tolerance': parameter.tolerance, 'free': parameter.free,
+        'source': parameter.source}
+    if parameter.low is not None and parameter.high is not None:
+        data['low'], data['high'] = parameter.low, parameter.high
+    return data
+
+
+def model_data(model: ModelFile) -> dict[str, object]:
+    """Return a model as plain data for YAML."""
+    structure: dict[str, object] = {'drivetrain': model.structure.drivetrain.value}
+    onset = model.structure.onset
+    if onset is not None:
+        structure['onset'] = {'kind': onset.kind.value, 'value': onset.value,
+                              'recording': onset.recording}
+    of_effects = {p.name for e in model.structure.effects for p in e.parameters()}
+    shared = packaged_parameters()
+    return {
+        'schema': SCHEMA, 'about': model.about, 'structure': structure,
+        'parameters': {p.name: _entry(p) for p in model.parameters.entries
+                       if p.name not in of_effects or p.name in shared},
+        'effects': [{
+            'effect': effect.id, 'side': effect.side, 'shape': effect.shape,
+            'late': effect.late,
+            'parameters': {p.name: _entry(model.parameters.entry(p.name))
+                           for p in effect.parameters() if p.name not in shared}}
+            for effect in model.structure.effects],
+    }
+
+
+def save_model(model: ModelFile, path: str | os.PathLike[str]) -> None:
+    """
+    Write a model file, whole or not at all.
+
+    Parameters
+    ----------
+    model : ModelFile
+    path : path-like
+        Replaced if it is there.
+    """
+    place = Path(path)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=place.parent, prefix=f'.{place.name}.')
+    try:
+        with os.fdopen(handle, 'w', encoding='utf-8') as stream:
+            yaml.safe_dump(model_data(model), stream, sort_keys=False, allow_unicode=True)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, place)
+    except BaseException:
+        os.unlink(temporary)
+        raise

@@ -1,0 +1,175 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A robot with numbers: continuous matrices, laws, command stage and sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lg_husky_sim.husky.effects import Onset
+from lg_husky_sim.signals import FloatArray, TimeSeries
+
+#: Rows of the output matrices.
+OUTPUTS = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate', 'current_left', 'current_right',
+           'accel_x', 'voltage_left', 'voltage_right')
+
+
+@dataclass(frozen=True)
+class CommandStage:
+    """
+    What happens to a commanded twist before it is a voltage.
+
+    Parameters
+    ----------
+    latency : float
+        Dead time [s].
+    slew_forward, slew_yaw : float
+        Acceleration limits [m/s², rad/s²]; infinite where there are none.
+    limit_forward, limit_yaw : float
+        Speed limits [m/s, rad/s]; infinite where there are none.
+    volts_per_speed, volts_per_rate : float
+        Eqs. (24), (25): left = speed − rate, right = speed + rate [V·s/m, V·s/rad].
+    clamp : float
+        Largest voltage [V]; 0 where a controller clamps instead.
+    """
+
+    volts_per_speed: float
+    volts_per_rate: float
+    clamp: float
+    latency: float = 0.0
+    slew_forward: float = np.inf
+    slew_yaw: float = np.inf
+    limit_forward: float = np.inf
+    limit_yaw: float = np.inf
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """
+    How the sensors read the truth.
+
+    Parameters
+    ----------
+    gyro_bias : float
+        Added to the yaw rate [rad/s].
+    gyro_factor, encoder_left, encoder_right : float
+        Factors on the yaw rate and the wheel rates.
+    delay_wheels, delay_imu, delay_pose : float
+        How late the stamps of a stream are [s].
+    """
+
+    gyro_bias: float = 0.0
+    gyro_factor: float = 1.0
+    encoder_left: float = 1.0
+    encoder_right: float = 1.0
+    delay_wheels: float = 0.0
+    delay_imu: float = 0.0
+    delay_pose: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class PlantSet:
+    """
+    Continuous matrices of one regime, x the states of graph and controllers, u two voltages.
+
+    Parameters
+    ----------
+    a, b, g : numpy.ndarray, shapes (n, n), (n, 2), (n, n_efforts)
+        dx/dt = a x + b u + g f(z).
+    h, k : numpy.ndarray, shapes (n_arguments, n), (n_arguments, 2)
+        z = h x + k u.
+    rows, rows_u, rows_f : numpy.ndarray, shapes (9, n), (9, 2), (9, n_efforts)
+        Outputs, in the order of :data:`OUTPUTS`.
+    laws, offsets : numpy.ndarray of int64, shape (n_efforts,)
+    coefficients : numpy.ndarray, shape (n_efforts, laws.WIDTH)
+    command : CommandStage
+    sensors : SensorModel
+    """
+
+    a: FloatArray
+    b: FloatArray
+    g: FloatArray
+    h: FloatArray
+    k: FloatArray
+    rows: FloatArray
+    rows_u: FloatArray
+    rows_f: FloatArray
+    laws: np.typing.NDArray[np.int64]
+    offsets: np.typing.NDArray[np.int64]
+    coefficients: FloatArray
+    command: CommandStage
+    sensors: SensorModel
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """
+    A robot with numbers.
+
+    Parameters
+    ----------
+    sets : tuple of PlantSet
+        One, or two where an effect begins at ``onset``.
+    states : tuple of str
+        Names of the n states.
+    onset : Onset or None
+    """
+
+    sets: tuple[PlantSet, ...]
+    states: tuple[str, ...]
+    onset: Onset | None = field(default=None)
+
+    @property
+    def linear(self) -> bool:
+        """Whether there are no efforts: the hold is then exact."""
+        return all(s.laws.size == 0 for s in self.sets)
+
+    def observe(self, truth: TimeSeries) -> TimeSeries:
+        """
+        Return what the sensors read of a simulated truth, on the same stamps.
+
+        Parameters
+        ----------
+        truth : TimeSeries
+            Columns of the simulator.
+
+        Returns
+        -------
+        TimeSeries
+            The same columns; wheel rates and angles by the encoders' factors, yaw rate by the
+            gyro's factor and bias, every stream by its delay. Speed, distance, currents and
+            voltages are left as they are.
+        """
+        late = np.zeros(len(truth), dtype=bool)
+        if self.onset is not None:
+            place = truth.times if self.onset.kind.value == 'time' else truth.column('x')
+            late = place >= self.onset.value
+            if self.onset.kind.value == 'place_below':
+                late = place <= self.onset.value
+        values = np.array(truth.values)
+        for index, one in enumerate(self.sets):
+            where = late if index else np.ones(len(truth), dtype=bool)
+            seen = _observed(truth, one.sensors)
+            values[where] = seen[where]
+        return TimeSeries(truth.times, values, truth.names)
+
+
+def _observed(truth: TimeSeries, sensors: SensorModel) -> FloatArray:
+    values = np.array(truth.values)
+    column = {name: i for i, name in enumerate(truth.names)}
+    for streams, delay in ((('wheel_left', 'wheel_right', 'angle_left', 'angle_right'),
+                            sensors.delay_wheels),
+                           (('yaw_rate', 'accel_x'), sensors.delay_imu),
+                           (('x', 'y', 'heading'), sensors.delay_pose)):
+        if delay != 0.0:
+            for name in streams:
+                values[:, column[name]] = np.interp(
+                    truth.times - delay, truth.times, truth.values[:, column[name]])
+    for side, factor in (('left', sensors.encoder_left), ('right', sensors.encoder_right)):
+        values[:, column[f'wheel_{side}']] *= factor
+        values[:, column[f'angle_{side}']] *= factor
+    rate = values[:, column['yaw_rate']]
+    values[:, column['yaw_rate']] = sensors.gyro_factor * rate + sensors.gyro_bias
+    return values

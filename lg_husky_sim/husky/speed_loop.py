@@ -1,0 +1,78 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Close a wheel-speed loop around the graph's two voltage sources."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from lg_husky_sim.husky.laws import WIDTH, Law
+from lg_husky_sim.husky.plant import PlantSet
+
+#: States that the loop adds.
+STATES = ('reference(left)', 'reference(right)', 'integral(left)', 'integral(right)')
+
+
+def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
+    """
+    Replace the open-loop voltages by a follower with a PI law.
+
+    For each side, with the transmission T, the reference voltage r of eqs. (24), (25) and the
+    wheel rate w::
+
+        w_f' = (r/T - w_f) / loop_lag
+        V    = T w_f + loop_gain (w_f - w) + I,   clipped to the supply
+        I'   = loop_integral (w_f - w) + (V_clipped - V) loop_integral / (loop_gain + T)
+
+    Parameters
+    ----------
+    plant : PlantSet
+        Open loop.
+    values : mapping of str to float
+        Must hold torque_constant, gear_ratio, supply_voltage, loop_lag, loop_gain,
+        loop_integral.
+
+    Returns
+    -------
+    PlantSet
+        With four more states; inputs are the reference voltages.
+    """
+    n, efforts = plant.a.shape[0], plant.laws.size
+    transmission = values['torque_constant'] * values['gear_ratio']
+    gain, integral = values['loop_gain'], values['loop_integral']
+    lag = values['loop_lag']
+    unwind = integral / (gain + transmission)
+    wheels = plant.rows[:2]
+    volts = np.hstack([-gain * wheels, (transmission + gain) * np.eye(2), np.eye(2)])
+    a = np.zeros((n + 4, n + 4))
+    a[:n, :n] = plant.a
+    a[:n] += plant.b @ volts
+    a[n:n + 2, n:n + 2] = -np.eye(2) / lag
+    a[n + 2:, :n] = -integral * wheels
+    a[n + 2:, n:n + 2] = integral * np.eye(2)
+    b = np.zeros((n + 4, 2))
+    b[n:n + 2] = np.eye(2) / (transmission * lag)
+    g = np.zeros((n + 4, efforts + 2))
+    g[:n, :efforts] = plant.g
+    g[:n, efforts:] = plant.b
+    g[n + 2:, efforts:] = unwind * np.eye(2)
+    arguments = plant.h.shape[0]
+    h = np.zeros((arguments + 2, n + 4))
+    h[:arguments, :n] = plant.h
+    h[:arguments] += plant.k @ volts
+    h[arguments:] = volts
+    rows = np.hstack([plant.rows, np.zeros((9, 4))]) + plant.rows_u @ volts
+    rows_f = np.hstack([plant.rows_f, plant.rows_u])
+    clip = np.zeros((2, WIDTH))
+    clip[:, 0] = values['supply_voltage']
+    return replace(
+        plant, a=a, b=b, g=g, h=h, k=np.zeros((arguments + 2, 2)), rows=rows,
+        rows_u=np.zeros((9, 2)), rows_f=rows_f,
+        laws=np.concatenate([plant.laws, np.full(2, int(Law.CLIP), dtype=np.int64)]),
+        offsets=np.concatenate([plant.offsets,
+                                np.array([arguments, arguments + 1], dtype=np.int64)]),
+        coefficients=np.vstack([plant.coefficients, clip]),
+        command=replace(plant.command, clamp=0.0))

@@ -1,0 +1,311 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Step a robot live, or roll out a recording's commands, over one kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.husky.laws import MEMORY
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
+from lg_husky_sim.simulation.discretise import Operators, discretise
+from lg_husky_sim.simulation.kernel import COLUMNS, DELAY, run
+
+_TAIL = 4 + 3 + MEMORY + 2 + 1 + 2 * DELAY
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatorState:
+    """
+    Everything that a simulation carries from one step to the next.
+
+    Parameters
+    ----------
+    flat : numpy.ndarray, shape (n + tail,)
+        Laid out as :mod:`lg_husky_sim.simulation.kernel` says; read-only.
+    row : numpy.ndarray, shape (15,)
+        The kernel's output columns at this moment; read-only.
+    n : int
+        States of graph and controllers.
+    """
+
+    flat: FloatArray
+    row: FloatArray
+    n: int
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self.flat[self.n + 6])
+
+    @property
+    def pose(self) -> Pose:
+        """True pose."""
+        flat = self.flat
+        return Pose(float(flat[self.n + 4]), float(flat[self.n + 5]), float(flat[self.n + 3]))
+
+    @property
+    def twist(self) -> BodyTwist:
+        """True velocity of the base."""
+        return BodyTwist(float(self.row[2]), float(self.row[3]))
+
+    @property
+    def wheel_rates(self) -> tuple[float, float]:
+        """Left and right wheel rates [rad/s]."""
+        return float(self.row[0]), float(self.row[1])
+
+    @property
+    def wheel_angles(self) -> tuple[float, float]:
+        """Integrals of the wheel rates, left and right [rad]."""
+        return float(self.flat[self.n]), float(self.flat[self.n + 1])
+
+    @property
+    def currents(self) -> tuple[float, float]:
+        """Motor currents, left and right [A]."""
+        return float(self.row[4]), float(self.row[5])
+
+    @property
+    def voltages(self) -> tuple[float, float]:
+        """Motor voltages, left and right [V]."""
+        return float(self.row[13]), float(self.row[14])
+
+    @property
+    def acceleration(self) -> float:
+        """Forward acceleration dv/dt at the end of the step [m/s²]."""
+        return float(self.row[6])
+
+    @property
+    def distance(self) -> float:
+        """Signed way along the path [m]."""
+        return float(self.flat[self.n + 2])
+
+
+class Simulator:
+    """
+    A plant that is stepped at one period.
+
+    Parameters
+    ----------
+    plant : Plant
+    period : float
+        Step [s].
+    fine_pose : bool
+        As in :func:`lg_husky_sim.simulation.discretise.discretise`.
+
+    Raises
+    ------
+    ParameterError
+        If the period is not a positive number.
+    """
+
+    def __init__(self, plant: Plant, period: float, *, fine_pose: bool = True) -> None:
+        if not (math.isfinite(period) and period > 0.0):
+            raise ParameterError(f'period = {period} s is not a positive number')
+        self.plant = plant
+        self.period = period
+        self.operators: Operators = discretise(plant, period, fine_pose=fine_pose)
+
+    def initial(self, pose: Pose | None = None, twist: BodyTwist | None = None,
+                time: float = 0.0, wheel_rates: tuple[float, float] | None = None,
+                wheel_angles: tuple[float, float] = (0.0, 0.0)) -> SimulatorState:
+        """
+        Return a state to start from.
+
+        Parameters
+        ----------
+        pose : Pose, optional
+        twist : BodyTwist, optional
+            Velocity of the base; at rest if not given.
+        time : float
+            Simulated time [s].
+        wheel_rates : tuple of float, optional
+            Left and right [rad/s]; those that roll without slip at ``twist`` if not given.
+        wheel_angles : tuple of float
+            Left and right [rad].
+
+        Returns
+        -------
+        SimulatorState
+            Other states (currents, controllers) are the least that agree with these outputs.
+        """
+        pose, twist = pose or Pose(), twist or BodyTwist()
+        one = self.plant.sets[0]
+        n = self.operators.n
+        flat = np.zeros(n + _TAIL)
+        if wheel_rates is None and (twist.forward or twist.yaw):
+            wheel_rates = self._rolling(twist)
+        wanted = np.array([*(wheel_rates or (0.0, 0.0)), twist.forward, twist.yaw])
+        if np.any(wanted):
+            flat[:n] = np.linalg.lstsq(one.rows[:4], wanted, rcond=None)[0]
+        flat[n:n + 2] = wheel_angles
+        flat[n + 3:n + 7] = pose.heading, pose.x, pose.y, time
+        row = np.zeros(len(COLUMNS))
+        row[:4] = wanted
+        row[7:13] = *wheel_angles, 0.0, pose.heading, pose.x, pose.y
+        return _state(flat, row, n)
+
+    def _rolling(self, twist: BodyTwist) -> tuple[float, float]:
+        # Wheel rates without slip: those at which the wheels' dampers carry no torque.
+        command = self.plant.sets[0].command
+        rates = np.array([twist.forward * command.volts_per_speed
+                          + sign * twist.yaw * command.volts_per_rate for sign in (-1.0, 1.0)])
+        one = self.plant.sets[0]
+        gains = one.rows[:4] @ np.linalg.solve(-one.a, one.b)
+        body = gains[2:] @ rates
+        share = [twist.forward / body[0] if body[0] else 1.0,
+                 twist.yaw / body[1] if body[1] else 1.0]
+        mean, half = 0.5 * (rates[0] + rates[1]), 0.5 * (rates[1] - rates[0])
+        left, right = gains[:2] @ np.array([share[0] * mean - share[1] * half,
+                                            share[0] * mean + share[1] * half])
+        return float(left), float(right)
+
+    def step(self, state: SimulatorState, command: BodyTwist) -> SimulatorState:
+        """
+        Return the state one period later.
+
+        Parameters
+        ----------
+        state : SimulatorState
+        command : BodyTwist
+            Held over the step.
+
+        Returns
+        -------
+        SimulatorState
+        """
+        flat = np.array(state.flat)
+        out = np.empty((1, len(COLUMNS)))
+        run(flat, np.array([[command.forward, command.yaw]]), out,
+            *self.operators.arguments)  # type: ignore[arg-type]
+        return _state(flat, out[0], state.n)
+
+    def run(self, state: SimulatorState, commands: FloatArray
+            ) -> tuple[SimulatorState, FloatArray]:
+        """
+        Advance by one period for each row of ``commands``.
+
+        Parameters
+        ----------
+        state : SimulatorState
+        commands : numpy.ndarray, shape (n_steps, 2)
+            Forward speed [m/s] and yaw rate [rad/s].
+
+        Returns
+        -------
+        SimulatorState
+            At the end.
+        numpy.ndarray, shape (n_steps, 15)
+            The kernel's columns after each step.
+        """
+        flat = np.array(state.flat)
+        out = np.empty((commands.shape[0], len(COLUMNS)))
+        run(flat, np.ascontiguousarray(commands, dtype=np.float64), out,
+            *self.operators.arguments)  # type: ignore[arg-type]
+        row = out[-1] if len(out) else state.row
+        return _state(flat, np.array(row), state.n), out
+
+    def adopt(self, state: SimulatorState) -> SimulatorState:
+        """
+        Return another simulator's state for this one, without a jump in motion or pose.
+
+        Parameters
+        ----------
+        state : SimulatorState
+
+        Returns
+        -------
+        SimulatorState
+            Where the number of states differs, wheel rates, velocity, angles and pose are kept
+            and the others start as in :meth:`initial`.
+        """
+        if state.n == self.operators.n:
+            return state
+        fresh = self.initial(state.pose, state.twist, state.time, state.wheel_rates,
+                             state.wheel_angles)
+        flat = np.array(fresh.flat)
+        flat[fresh.n:] = state.flat[state.n:]
+        return _state(flat, np.array(state.row), fresh.n)
+
+
+def _state(flat: FloatArray, row: FloatArray, n: int) -> SimulatorState:
+    flat.setflags(write=False)
+    row.setflags(write=False)
+    return SimulatorState(flat, row, n)
+
+
+def hold(commands: TimeSeries, start: float, period: float, count: int) -> FloatArray:
+    """
+    Average zero-order-held commands over the steps of a grid.
+
+    Parameters
+    ----------
+    commands : TimeSeries
+        Names forward, yaw; each value holds until the next stamp, nothing is commanded before
+        the first.
+    start, period : float
+        Grid [s].
+    count : int
+        Number of steps.
+
+    Returns
+    -------
+    numpy.ndarray, shape (count, 2)
+    """
+    edges = start + period * np.arange(count + 1)
+    values = np.column_stack([commands.column('forward'), commands.column('yaw')])
+    if len(commands) == 0:
+        return np.zeros((count, 2))
+    spans = np.diff(commands.times)
+    area = np.vstack([np.zeros(2), np.cumsum(values[:-1] * spans[:, None], axis=0)])
+    last = np.searchsorted(commands.times, edges, side='right') - 1
+    known = last >= 0
+    safe = np.maximum(last, 0)
+    reached = area[safe] + values[safe] * (edges - commands.times[safe])[:, None]
+    reached[~known] = 0.0
+    averaged: FloatArray = np.diff(reached, axis=0) / period
+    return averaged
+
+
+def rollout(plant: Plant, commands: TimeSeries, end: float, period: float = 0.02,
+            start: float | None = None, pose: Pose | None = None,
+            twist: BodyTwist | None = None, wheel_rates: tuple[float, float] | None = None,
+            wheel_angles: tuple[float, float] = (0.0, 0.0)) -> TimeSeries:
+    """
+    Drive a plant with recorded commands.
+
+    Parameters
+    ----------
+    plant : Plant
+    commands : TimeSeries
+        Names forward [m/s], yaw [rad/s]; held at their own stamps, averaged over each step.
+    end : float
+        Last time [s].
+    period : float
+        Step [s].
+    start : float, optional
+        First time [s]; the first command's stamp if not given.
+    pose, twist, wheel_rates, wheel_angles
+        Where to start, as in :meth:`Simulator.initial`.
+
+    Returns
+    -------
+    TimeSeries
+        Columns of the kernel at start, start + period, ...: the truth, before the sensors.
+
+    Raises
+    ------
+    ParameterError
+        If the period is not positive.
+    """
+    simulator = Simulator(plant, period)
+    first = float(commands.times[0]) if start is None else start
+    count = max(0, math.floor((end - first) / period + 1e-9))
+    state = simulator.initial(pose, twist, first, wheel_rates, wheel_angles)
+    _, out = simulator.run(state, hold(commands, first, period, count))
+    times = first + period * np.arange(count + 1)
+    return TimeSeries(times, np.vstack([state.row, out]), COLUMNS)
