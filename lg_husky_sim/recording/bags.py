@@ -95,8 +95,6 @@ def open_bag(path: Path) -> Iterator[Bag]:
 
 def _files(path: Path) -> list[Path]:
     """Return what to open for a path that the user named."""
-    if path.name == 'metadata.yaml' and path.is_file():
-        path = path.parent
     if not path.exists():
         raise RecordingError(f'no recording {path}: there is no such file or folder')
     if path.is_dir():

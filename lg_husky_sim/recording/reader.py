@@ -57,6 +57,8 @@ def read_recording(path: str | PathLike[str], topics: TopicMap | None = None) ->
         If the package `rosbags` is not installed.
     """
     place = Path(path)
+    if place.name == 'metadata.yaml':
+        place = place.parent
     chosen = topics or TopicMap()
     with open_bag(place) as bag:
         present = bag.topics()

@@ -135,4 +135,3 @@ def _rows(place: int, times: FloatArray, start_ns: int) -> Iterator[tuple[int, i
             'positive')
     for index, stamp in enumerate(stamps.tolist()):
         yield stamp, place, index
-
