@@ -1,0 +1,169 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Named mistakes of a linear graph; each message says which branch and what to do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from lg_husky_sim.errors import GraphError
+from lg_husky_sim.linear_graph.elements import Branch, Domain, Kind
+
+if TYPE_CHECKING:
+    from lg_husky_sim.linear_graph.graph import Edge, LinearGraph, Node
+
+
+def check_graph(graph: LinearGraph) -> None:
+    """
+    Check everything that can be seen from the graph's shape.
+
+    Raises
+    ------
+    GraphError
+        For the first mistake found.
+    """
+    if not graph.edges:
+        raise GraphError('the graph has no branches')
+    _check_names(graph)
+    _check_nodes(graph)
+    _check_grounding(graph)
+    _check_masses(graph)
+    _check_across_loops(graph)
+    _check_through_cuts(graph)
+    _check_characteristics(graph)
+
+
+def _check_names(graph: LinearGraph) -> None:
+    seen: set[str] = set()
+    for name in graph.names:
+        if name in seen:
+            raise GraphError(f'the name {name!r} is used twice; every branch and two-port needs '
+                             'a name of its own')
+        seen.add(name)
+
+
+def _check_nodes(graph: LinearGraph) -> None:
+    owner: dict[str, Edge] = {}
+    for edge in graph.edges:
+        ground = graph.ground_of(edge.domain)
+        for node in (edge.tail, edge.head):
+            if node == ground:
+                continue
+            first = owner.setdefault(node[1], edge)
+            if first.domain is not edge.domain:
+                raise GraphError(
+                    f'node {node[1]!r} is {first.domain.value} at {first.name!r} and '
+                    f'{edge.domain.value} at {edge.name!r}; only a two-port joins domains, so '
+                    'correct the domain or give the nodes two names')
+
+
+def _check_grounding(graph: LinearGraph) -> None:
+    for domain in graph.domains:
+        edges = [edge for edge in graph.edges if edge.domain is domain]
+        ground = graph.ground_of(domain)
+        if all(ground not in (edge.tail, edge.head) for edge in edges):
+            raise GraphError(
+                f'the {domain.value} domain has no ground: no branch touches node {ground[1]!r}; '
+                f'connect one of {", ".join(edge.name for edge in edges[:6])} to it')
+        reached = Forest()
+        for edge in edges:
+            reached.join(edge.tail, edge.head)
+        for edge in edges:
+            if reached.find(edge.tail) != reached.find(ground):
+                part = [e.name for e in edges if reached.find(e.tail) == reached.find(edge.tail)]
+                raise GraphError(
+                    f'node {edge.tail[1]!r} floats: {", ".join(part[:6])} have no way to the '
+                    f'{domain.value} ground {ground[1]!r}; connect one of them to it')
+
+
+def _check_masses(graph: LinearGraph) -> None:
+    inertial = {Domain.TRANSLATIONAL: 'velocity of a mass', Domain.THERMAL:
+                'temperature of a heat capacity', Domain.ROTATIONAL: 'speed of an inertia'}
+    for branch in graph.of_kind(Kind.A_TYPE):
+        ground = graph.ground_of(branch.domain)[1]
+        if branch.domain in inertial and ground not in (branch.tail, branch.head):
+            raise GraphError(f'A-type {branch.name!r} lies between {branch.tail!r} and '
+                             f'{branch.head!r}; the {inertial[branch.domain]} is measured against '
+                             f'ground, so one end must be {ground!r}')
+
+
+def _check_across_loops(graph: LinearGraph) -> None:
+    forest = Forest()
+    sources = graph.of_kind(Kind.ACROSS_SOURCE)
+    for at, branch in enumerate(sources):
+        tail, head = (branch.domain, branch.tail), (branch.domain, branch.head)
+        if not forest.join(tail, head):
+            path = path_between(sources[:at], tail, head)
+            raise GraphError(f'across sources {", ".join((*path, branch.name))} form a loop, so '
+                             'they may contradict each other; remove one, or put a D-type in '
+                             'series')
+
+
+def path_between(branches: tuple[Branch, ...], start: Node, end: Node) -> tuple[str, ...]:
+    """Return the names of the branches on the only way between two nodes of a forest."""
+    ways: dict[Node, tuple[str, ...]] = {start: ()}
+    frontier = [start]
+    while frontier and end not in ways:
+        node = frontier.pop()
+        for branch in branches:
+            pair = ((branch.domain, branch.tail), (branch.domain, branch.head))
+            if node in pair:
+                other = pair[1] if pair[0] == node else pair[0]
+                if other not in ways:
+                    ways[other] = (*ways[node], branch.name)
+                    frontier.append(other)
+    return ways.get(end, ())
+
+
+def _check_through_cuts(graph: LinearGraph) -> None:
+    forest = Forest()
+    sources = [e for e in graph.edges
+               if isinstance(e.owner, Branch) and e.owner.kind is Kind.THROUGH_SOURCE]
+    for edge in graph.edges:
+        if edge not in sources:
+            forest.join(edge.tail, edge.head)
+    for domain in graph.domains:
+        ground = forest.find(graph.ground_of(domain))
+        for node in (n for n in graph.nodes if n[0] is domain):
+            if forest.find(node) != ground:
+                part = forest.find(node)
+                cut = [e.name for e in sources
+                       if (forest.find(e.tail) == part) != (forest.find(e.head) == part)]
+                raise GraphError(
+                    f'through sources {", ".join(cut)} alone connect node {node[1]!r}, so they '
+                    'may contradict each other and its across variable is open; put another '
+                    'element in parallel')
+
+
+def _check_characteristics(graph: LinearGraph) -> None:
+    for branch in graph.branches:
+        if branch.characteristic is None:
+            continue
+        for text in branch.characteristic.of:
+            try:
+                graph.variable(text)
+            except GraphError as error:
+                raise GraphError(f'characteristic of {branch.name!r}: {error}') from error
+
+
+class Forest:
+    """Sets of nodes joined so far (union-find)."""
+
+    def __init__(self) -> None:
+        """Start with every node by itself."""
+        self._parent: dict[Node, Node] = {}
+
+    def find(self, node: Node) -> Node:
+        """Return the representative of the node's set."""
+        while (parent := self._parent.get(node, node)) != node:
+            self._parent[node] = self._parent.get(parent, parent)
+            node = parent
+        return node
+
+    def join(self, one: Node, other: Node) -> bool:
+        """Join two sets; False if they were one already."""
+        first, second = self.find(one), self.find(other)
+        if first == second:
+            return False
+        self._parent[first] = second
+        return True

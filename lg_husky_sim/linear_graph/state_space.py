@@ -1,0 +1,92 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""State-space matrices with the names of their rows and columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+MATRICES = ('A', 'B', 'C', 'D', 'E', 'F', 'G', 'H', 'K', 'L_c')
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """
+    Numbers of a state-space model derived from a linear graph.
+
+    dx/dt = A x + B u + E du/dt + G f(z),  z = H x + K u,
+    y = C x + D u + F du/dt + L_c f(z)
+
+    E and F are zero unless the graph has excess storages that inputs act on (Rowell and Wormley,
+    ch. 5.5); :meth:`standard_form` removes E.
+
+    Parameters
+    ----------
+    A, B, E, G : numpy.ndarray, shapes (n, n), (n, m), (n, m), (n, k)
+        State equations, SI.
+    C, D, F, L_c : numpy.ndarray, shapes (p, n), (p, m), (p, m), (p, k)
+        Output equations; L_c is the feed-through of efforts.
+    H, K : numpy.ndarray, shapes (q, n), (q, m)
+        Arguments z of the efforts, one effort's after the other's.
+    states, inputs, outputs, efforts, arguments : tuple of str
+        Names of x (n), u (m), y (p), f (k) and z (q).
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    E: FloatArray
+    F: FloatArray
+    G: FloatArray
+    H: FloatArray
+    K: FloatArray
+    L_c: FloatArray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    efforts: tuple[str, ...]
+    arguments: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Set the arrays read-only; they are made for this object by the derivation."""
+        for name in MATRICES:
+            self.__dict__[name].setflags(write=False)
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """Eigenvalues of A [1/s], shape (n,), slowest last, real first where equal."""
+        found: NDArray[np.complex128] = np.linalg.eigvals(self.A).astype(np.complex128)
+        return found[np.lexsort((found.imag, found.real))]
+
+    def standard_form(self) -> StateSpace:
+        """
+        Return the model without input derivatives in the state equations.
+
+        The states become x' = x - E u (Rowell and Wormley, eq. 5.34 and below), so that
+        dx'/dt = A x' + (B + A E) u + G f. Unchanged if E is zero.
+
+        Returns
+        -------
+        StateSpace
+            Same names; where E has a row that is not zero, the state is x - E u.
+        """
+        if not self.E.any():
+            return self
+        return replace(
+            self, B=self.B + self.A @ self.E, D=self.D + self.C @ self.E,
+            K=self.K + self.H @ self.E, E=np.zeros_like(self.E))
+
+    def __str__(self) -> str:
+        """Return all matrices that have entries, with their names."""
+        parts = []
+        for field in fields(self)[:len(MATRICES)]:
+            matrix = getattr(self, field.name)
+            if matrix.size and (field.name in 'ABCD' or matrix.any()):
+                parts.append(f'{field.name} =\n{np.array2string(matrix, max_line_width=99)}')
+        return '\n'.join([f'x = {", ".join(self.states)}', f'u = {", ".join(self.inputs)}',
+                          f'y = {", ".join(self.outputs)}', *parts])
