@@ -3,13 +3,31 @@
 """State-space models of multi-domain systems from linear graphs; no robots, no ROS."""
 
 from lg_husky_sim.linear_graph.elements import (
-    Branch, Characteristic, default_form, Domain, Form, Kind, TwoPort)
+    Branch,
+    Characteristic,
+    default_form,
+    Domain,
+    Form,
+    Kind,
+    TwoPort,
+)
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.normal_tree import normal_tree, NormalTree
 from lg_husky_sim.linear_graph.numeric import compile_numeric, NumericModel
 from lg_husky_sim.linear_graph.state_space import StateSpace
 
 __all__ = [
-    'Branch', 'Characteristic', 'compile_numeric', 'default_form', 'Domain', 'Form', 'Kind',
-    'LinearGraph', 'normal_tree', 'NormalTree', 'NumericModel', 'StateSpace', 'TwoPort',
+    'Branch',
+    'Characteristic',
+    'Domain',
+    'Form',
+    'Kind',
+    'LinearGraph',
+    'NormalTree',
+    'NumericModel',
+    'StateSpace',
+    'TwoPort',
+    'compile_numeric',
+    'default_form',
+    'normal_tree',
 ]

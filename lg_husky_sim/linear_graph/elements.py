@@ -91,6 +91,9 @@ class Characteristic:
         The arguments: variables such as ``'v(M_H)'`` or ``'i(L_1)'``.
     parameters : tuple of str
         Names of parameters; a named law takes them in its own order.
+    modulated : bool
+        Whether a parameter is a signal that changes in time (a heading, a temperature): the law
+        is then never taken for a linear one.
 
     Raises
     ------
@@ -101,6 +104,7 @@ class Characteristic:
     law: str
     of: tuple[str, ...]
     parameters: tuple[str, ...] = ()
+    modulated: bool = False
 
     def __post_init__(self) -> None:
         """Check the law against its arguments and parameters."""
@@ -129,7 +133,7 @@ class Characteristic:
     @property
     def linear(self) -> dict[str, str] | None:
         """Coefficient of each argument if the law is linear without a constant, else None."""
-        return linear_coefficients(self.expression, self.arguments)
+        return None if self.modulated else linear_coefficients(self.expression, self.arguments)
 
 
 @dataclass(frozen=True)

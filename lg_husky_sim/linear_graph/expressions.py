@@ -15,7 +15,7 @@ from functools import lru_cache
 import keyword
 import math
 from types import CodeType
-from typing import Any
+from typing import Any, TypeGuard
 
 from lg_husky_sim.errors import GraphError
 
@@ -85,7 +85,7 @@ def _check(node: ast.expr, shown: str, depth: int) -> None:
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, _UNARY):
         _check(node.operand, shown, depth - 1)
         return
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+    if isinstance(node, ast.Constant) and is_number(node.value):
         if not abs(node.value) < 1e300:
             raise GraphError(f'expression {shown}: a number in it is too large')
         return
@@ -107,6 +107,11 @@ def _check(node: ast.expr, shown: str, depth: int) -> None:
                      f'numbers, + - * / ** and {", ".join(FUNCTIONS)}')
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Tell a literal int or float from booleans, complex numbers and text."""
+    return type(value) in (int, float)
+
+
 def number_of(node: ast.expr) -> float | None:
     """Return the value of a literal number with its sign, or None for anything else."""
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, _UNARY):
@@ -114,7 +119,7 @@ def number_of(node: ast.expr) -> float | None:
         if inner is None:
             return None
         return -inner if isinstance(node.op, ast.USub) else inner
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+    if isinstance(node, ast.Constant) and is_number(node.value):
         return float(node.value)
     return None
 
@@ -153,16 +158,17 @@ def evaluate(text: str, values: Mapping[str, float]) -> float:
     NameError, ZeroDivisionError, ValueError, OverflowError
         As Python's arithmetic raises them.
     """
-    return float(eval(compile_tuple((text,)), dict(GLOBALS), dict(values))[0])
+    # only what parse() has checked is ever compiled
+    return float(eval(compile_tuple((text,)), dict(GLOBALS), dict(values))[0])  # noqa: S307
 
 
 def substituted(text: str, replacements: Mapping[str, str]) -> str:
     """Return the expression with names replaced by other expressions."""
     class Replace(ast.NodeTransformer):
-        def visit_Name(self, node: ast.Name) -> ast.expr:  # noqa: N802
+        def visit_Name(self, node: ast.Name) -> ast.expr:
             return parse(replacements[node.id]) if node.id in replacements else node
 
-        def visit_Call(self, node: ast.Call) -> ast.Call:  # noqa: N802
+        def visit_Call(self, node: ast.Call) -> ast.Call:
             return ast.Call(func=node.func, args=[self.visit(node.args[0])], keywords=[])
     # parse again: a transformer changes its tree, and parsed trees are shared
     tree = ast.parse(ast.unparse(parse(text)), mode='eval').body

@@ -143,7 +143,8 @@ class LinearGraph:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all branches and two-ports."""
-        return tuple(element.name for element in (*self.branches, *self.two_ports))
+        return (*(branch.name for branch in self.branches),
+                *(two_port.name for two_port in self.two_ports))
 
     def edge_index(self, name: str) -> int:
         """
@@ -174,8 +175,8 @@ class LinearGraph:
         """
         match = _VARIABLE.fullmatch(text) if isinstance(text, str) else None
         if match is None:
-            raise GraphError(f"variable {text!r} must be written as symbol(branch), "
-                             "for example 'v(M_H)'")
+            raise GraphError(f'variable {text!r} must be written as symbol(branch), '
+                             'for example v(M_H)')
         symbol, name = match.groups()
         ports = [f'{name}.1', f'{name}.2'] if f'{name}.1' in self._index else [name]
         found = []

@@ -20,14 +20,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from lg_husky_sim.errors import GraphError
 from lg_husky_sim.linear_graph.checks import Forest
 from lg_husky_sim.linear_graph.elements import Branch, Kind, SOURCES
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.modular import (
-    Elimination, generic_numbers, IntArray, is_regular, PRIME)
+    Elimination,
+    generic_numbers,
+    IntArray,
+    is_regular,
+    PRIME,
+)
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -123,7 +127,7 @@ def _interconnection(graph: LinearGraph, leave_out: frozenset[str] = frozenset()
         rows[row, [count + link for link in links]] = loops[row - len(links)]
     ports = []
     numbers = generic_numbers(len(graph.two_ports))
-    for at, (two_port, ratio) in enumerate(zip(graph.two_ports, numbers)):
+    for at, (two_port, ratio) in enumerate(zip(graph.two_ports, numbers, strict=True)):
         one, two = (graph.edge_index(f'{two_port.name}.{port}') for port in (1, 2))
         first, second = count + 2 * at, count + 2 * at + 1
         if two_port.kind is Kind.TRANSFORMER:
@@ -135,7 +139,7 @@ def _interconnection(graph: LinearGraph, leave_out: frozenset[str] = frozenset()
         ports.append((two_port.name, (one, two, count + one, count + two)))
     elimination = Elimination(rows)
     for name, columns in ports:
-        if not all([elimination.pivot(column) for column in columns]):
+        if not all(elimination.pivot(column) for column in columns):
             raise GraphError(f'two-port {name!r} has a variable that nothing determines (its '
                              'ports are shorted, open, or doubled by other two-ports); connect '
                              'an element to it or remove it')
@@ -144,7 +148,8 @@ def _interconnection(graph: LinearGraph, leave_out: frozenset[str] = frozenset()
 
 def _any_forest(graph: LinearGraph) -> tuple[list[int], list[int]]:
     forest = Forest()
-    tree, links = [], []
+    tree: list[int] = []
+    links: list[int] = []
     for at, edge in enumerate(graph.edges):
         (tree if forest.join(edge.tail, edge.head) else links).append(at)
     return tree, links
@@ -207,7 +212,7 @@ def _ports_in_tree(graph: LinearGraph, one_ports: set[str]) -> set[str]:
             raise GraphError(f'two-port {graph.two_ports[len(placed)].name!r} has no valid place '
                              'in a normal tree; connect an element to its ports')
     found = set()
-    for two_port, gyrator, choice in zip(graph.two_ports, gyrators, placed):
+    for two_port, gyrator, choice in zip(graph.two_ports, gyrators, placed, strict=True):
         if gyrator:
             found |= {f'{two_port.name}.1', f'{two_port.name}.2'} if choice == 1 else set()
         else:

@@ -11,14 +11,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from lg_husky_sim.errors import GraphError, ParameterError
 from lg_husky_sim.linear_graph.expressions import compile_tuple, evaluate, GLOBALS, names_in
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.modular import generic_numbers
 from lg_husky_sim.linear_graph.state_space import FloatArray, StateSpace
 from lg_husky_sim.linear_graph.structure import analyse, Structure
+import numpy as np
 
 SMALLEST = float(np.finfo(np.float64).tiny)
 TOLERANCE = 1e-9
@@ -151,7 +150,9 @@ class NumericModel:
             If a parameter is missing or an element's value is not allowed.
         """
         try:
-            raw = np.array(eval(self._code, self._globals, values), dtype=np.float64)
+            # only what parse() has checked is ever compiled
+            raw = np.array(eval(self._code, self._globals, values),  # noqa: S307
+                           dtype=np.float64)
         except (NameError, KeyError, ArithmeticError, ValueError, TypeError) as error:
             raise self._explained(values) from error
         size = np.abs(raw)
@@ -190,7 +191,8 @@ class NumericModel:
             mass = np.diag(storage[:n]) - coupling @ dependent[:, :n]
             right = np.hstack([drive, coupling @ dependent[:, to_input:to_effort]])
             solved = np.linalg.solve(mass, right)
-            rates, derivative = solved[:, :to_excess], solved[:, to_excess:]
+            rates = np.asarray(solved[:, :to_excess], dtype=np.float64)
+            derivative = np.asarray(solved[:, to_excess:], dtype=np.float64)
             # through of an excess A-type (across of an excess T-type) = value * d(dependent)/dt
             lever = rest[:, to_excess:] * storage[n:]
             feed = rest[:, :to_excess] + lever @ dependent[:, :n] @ rates
@@ -205,7 +207,7 @@ class NumericModel:
     def _generic_values(self) -> FloatArray:
         """Return generic positive values, the same for the same parameter."""
         parameters = {name: 0.5 + number / 2**31 for name, number in zip(
-            self.parameters, generic_numbers(len(self.parameters)))}
+            self.parameters, generic_numbers(len(self.parameters)), strict=True)}
         raw = []
         for at, value in enumerate(self.structure.values):
             try:
@@ -221,7 +223,7 @@ class NumericModel:
         if not structure.efforts and not s:
             return
         rows, storage = self._parts(self._generic_values())
-        _, to_effort, to_excess = self._slices
+        to_input, to_effort, to_excess = self._slices
         for at, edge in enumerate(structure.excess):
             name = self.graph.edges[edge].name
             for column in np.flatnonzero(np.abs(rows[n + at, to_effort:]) > TOLERANCE):
@@ -239,8 +241,16 @@ class NumericModel:
             mass = np.diag(storage[:n]) - coupling @ dependent[:, :n]
             rates = np.linalg.solve(mass, rows[:n, to_effort:to_excess])
             direct = direct + arguments[:, to_excess:] * storage[n:] @ dependent[:, :n] @ rates
-        for row, column in zip(*np.nonzero(np.abs(direct) > TOLERANCE)):
+            self._refuse_derivatives(arguments[:, to_excess:] * storage[n:],
+                                     dependent[:, to_input:to_effort])
+        for row, column in zip(*np.nonzero(np.abs(direct) > TOLERANCE), strict=True):
             self._raise_loop(int(row), owners[row], structure.efforts[column])
+
+    def _refuse_derivatives(self, lever: FloatArray, by_input: FloatArray) -> None:
+        for row, column in zip(*np.nonzero(np.abs(lever @ by_input) > TOLERANCE), strict=True):
+            raise GraphError(
+                f'the argument {self.arguments[row]} of a non-linear law hangs on the rate of '
+                f'change of input {self.inputs[column]!r}; put a D-type in series with the source')
 
     def _raise_loop(self, argument: int, owner: int, cause: int) -> None:
         edges = self.graph.edges
@@ -278,4 +288,4 @@ class NumericModel:
         return ParameterError('an element has a value that is too small or not a number')
 
 
-__all__ = ['compile_numeric', 'NumericModel']
+__all__ = ['NumericModel', 'compile_numeric']

@@ -15,13 +15,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lg_husky_sim.errors import GraphError
 from lg_husky_sim.linear_graph.elements import Branch, Characteristic, Kind, SOURCES
 from lg_husky_sim.linear_graph.graph import LinearGraph, Variable
 from lg_husky_sim.linear_graph.normal_tree import normal_tree, NormalTree
+import numpy as np
+from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
@@ -153,7 +152,8 @@ class Structure:
     def characteristic(self, edge: int) -> Characteristic:
         """Return the characteristic of an effort's branch."""
         owner = self.graph.edges[edge].owner
-        assert isinstance(owner, Branch) and owner.characteristic is not None
+        if not isinstance(owner, Branch) or owner.characteristic is None:
+            raise GraphError(f'{owner.name!r} has no characteristic')
         return owner.characteristic
 
 
@@ -259,7 +259,7 @@ class _Builder:
             return
         self.algebraic.append(edge)
         name = self.graph.edges[edge].name
-        for argument, source in zip(characteristic.arguments, sources):
+        for argument, source in zip(characteristic.arguments, sources, strict=True):
             if argument in linear:
                 at = self._value(name, linear[argument], 'any')
                 self._term(edge, at, False, 1, source)

@@ -7,16 +7,17 @@ from __future__ import annotations
 import subprocess
 import sys
 
+from lg_husky_sim.linear_graph import compile_numeric, LinearGraph
 import numpy as np
+from numpy.typing import NDArray
 import pytest
 
-from lg_husky_sim.linear_graph import compile_numeric
-from test.linear_graph.husky_graph import PAPER, POLES, simplified, STATES
+STATES = ('omega(J_LW)', 'omega(J_RW)', 'v(M_H)', 'omega(J_H)', 'i(L_1)', 'i(L_2)')
+POLES = (-1663.81, -1663.80, -460.11, -459.99, -8.8395, -3.5931)
+UNEQUAL = {'B_RL': 0.9, 'B_FL': 1.1, 'B_FR': 1.7, 'B_RR': 2.3, 'R_2': 0.5}
 
-UNEQUAL = {**PAPER, 'B_RL': 0.9, 'B_FL': 1.1, 'B_FR': 1.7, 'B_RR': 2.3, 'R_2': 0.5}
 
-
-def printed_state_matrix(values: dict[str, float], at_4_3: float) -> np.ndarray:
+def printed_state_matrix(values: dict[str, float], at_4_3: float) -> NDArray[np.float64]:
     """Return A as eq. (19) prints it, with the erratum's factor at row 4, column 3."""
     odd, left, right = 1.0 / values['r_W'], -values['c'] / values['r_W'], (
         values['c'] / values['r_W'])
@@ -38,9 +39,11 @@ def printed_state_matrix(values: dict[str, float], at_4_3: float) -> np.ndarray:
         [0, -motor / values['L_2'], 0, 0, 0, -values['R_2'] / values['L_2']]])
 
 
-@pytest.mark.parametrize('values', [PAPER, UNEQUAL], ids=['paper', 'unequal'])
-def test_matrices_are_eqs_19_to_22_with_the_erratum(values: dict[str, float]) -> None:
-    model = compile_numeric(simplified(), STATES[:4]).at(values)
+@pytest.mark.parametrize('changed', [{}, UNEQUAL], ids=['paper', 'unequal'])
+def test_matrices_are_eqs_19_to_22_with_the_erratum(
+        husky: LinearGraph, paper: dict[str, float], changed: dict[str, float]) -> None:
+    values = {**paper, **changed}
+    model = compile_numeric(husky, STATES[:4]).at(values)
     assert model.states == STATES
     assert model.inputs == ('V_s1', 'V_s2')
     expected = printed_state_matrix(values, 1.0 / values['J_H'])
@@ -53,24 +56,26 @@ def test_matrices_are_eqs_19_to_22_with_the_erratum(values: dict[str, float]) ->
     assert not model.E.any()
 
 
-def test_erratum_shows_only_where_dampings_differ() -> None:
-    derived = compile_numeric(simplified()).at(UNEQUAL).A
-    printed = printed_state_matrix(UNEQUAL, 1.0)
+def test_erratum_shows_only_where_dampings_differ(
+        husky: LinearGraph, paper: dict[str, float]) -> None:
+    values = {**paper, **UNEQUAL}
+    derived = compile_numeric(husky).at(values).A
+    printed = printed_state_matrix(values, 1.0)
     differing = np.argwhere(~np.isclose(derived, printed, rtol=1e-9, atol=1e-9))
     np.testing.assert_array_equal(differing, [[3, 2]])
-    np.testing.assert_allclose(printed_state_matrix(PAPER, 1.0)[3, 2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(printed_state_matrix(paper, 1.0)[3, 2], 0.0, atol=1e-12)
 
 
-def test_poles_of_row_21() -> None:
-    poles = compile_numeric(simplified()).at(PAPER).poles
+def test_poles_of_row_21(husky: LinearGraph, paper: dict[str, float]) -> None:
+    poles = compile_numeric(husky).at(paper).poles
     assert np.all(poles.imag == 0.0)
     np.testing.assert_allclose(poles.real, POLES, rtol=2e-5)
 
 
 def test_numeric_path_leaves_sympy_and_matplotlib_alone() -> None:
-    code = ('import sys; from test.linear_graph.husky_graph import *; '
+    code = ('import sys; from lg_husky_sim.husky.network import simplified; '
             'from lg_husky_sim.linear_graph import compile_numeric; '
-            'compile_numeric(simplified(), STATES).at(PAPER); '
+            "compile_numeric(simplified(), ['v(M_H)']); "
             "print([n for n in ('sympy', 'matplotlib', 'yaml', 'scipy') if n in sys.modules])")
     shown = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                            check=True)

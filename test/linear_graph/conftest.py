@@ -1,19 +1,18 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's Husky graphs built from branches, independently of ``lg_husky_sim.husky``."""
+"""The paper's Husky graph built from branches, independently of ``lg_husky_sim.husky``."""
 
 from __future__ import annotations
 
 from lg_husky_sim.linear_graph import Branch, Domain, Kind, LinearGraph, TwoPort
+import pytest
 
 ELECTRICAL, TRANSLATIONAL, ROTATIONAL = (
     Domain.ELECTRICAL, Domain.TRANSLATIONAL, Domain.ROTATIONAL)
-STATES = ('omega(J_LW)', 'omega(J_RW)', 'v(M_H)', 'omega(J_H)', 'i(L_1)', 'i(L_2)')
 PAPER = {
     'R_1': 0.46, 'R_2': 0.46, 'L_1': 0.22e-3, 'L_2': 0.22e-3, 'k_t': 0.044488, 'GR': 78.71,
     'J_LW': 0.08, 'J_RW': 0.08, 'M_H': 48.39, 'J_H': 3.0556, 'B_RL': 1.3016, 'B_FL': 1.3016,
     'B_FR': 1.3016, 'B_RR': 1.3016, 'B_H': 12.8650, 'r_W': 0.1651, 'c': 0.5708 / 2.0}
-POLES = (-1663.81, -1663.80, -460.11, -459.99, -8.8395, -3.5931)
 
 
 def slip(name: str, first: int, node: str, sign: str) -> tuple[Branch, TwoPort, TwoPort]:
@@ -37,7 +36,14 @@ def motor(side: str, number: int, axle: str) -> tuple[Branch, Branch, Branch, Tw
                 (ROTATIONAL, axle, 'ground'), 'k_t*GR'))
 
 
-def simplified() -> LinearGraph:
+@pytest.fixture(scope='session')
+def paper() -> dict[str, float]:
+    """Return Table I with the fitted values of Table II, and Clearpath's radius and track."""
+    return dict(PAPER)
+
+
+@pytest.fixture(scope='session')
+def husky() -> LinearGraph:
     """Return the graph of Fig. 10, 6 states."""
     elements = (
         *motor('L', 1, 'axle_L'), *motor('R', 2, 'axle_R'),
