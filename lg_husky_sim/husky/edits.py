@@ -6,11 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+import re
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import Effect
-from lg_husky_sim.linear_graph import Branch, Characteristic, Domain, Kind, LinearGraph
-from lg_husky_sim.husky.laws import Law
+from lg_husky_sim.husky.laws import EXPRESSIONS, SIGNALS, Law
+from lg_husky_sim.linear_graph import (
+    Branch, Characteristic, Domain, Kind, LinearGraph, TwoPort)
+from lg_husky_sim.linear_graph.expressions import names_in
 
 #: A coefficient of a law: a number, or an expression in the names of the parameters.
 Coefficient = str | float
@@ -66,7 +69,7 @@ class EditedNetwork:
         """Return this network with other value expressions on branches or two-ports."""
         graph = self.graph
         for name, value in values.items():
-            graph = graph.replacing(replace(graph.element(name), value=value))
+            graph = graph.replacing(replace(_element_of(graph, name), value=value))
         return replace(self, graph=graph)
 
     def with_force(self, name: str, domain: Domain, node: str, ground: str, row: LawRow,
@@ -80,7 +83,7 @@ class EditedNetwork:
     def with_voltage(self, effect: str, number: str, row: LawRow, of: tuple[str, ...]
                      ) -> EditedNetwork:
         """Return this network with a modulated across-source in series with a motor's supply."""
-        winding = self.graph.branch(f'R_{number}')
+        winding = branch_of(self.graph, f'R_{number}')
         node = f'{winding.tail}_{effect}'
         name = f'E_{effect}_{number}'
         source = Branch(name, Kind.ACROSS_SOURCE, Domain.ELECTRICAL, node, winding.tail,
@@ -90,7 +93,7 @@ class EditedNetwork:
 
     def with_slip_torque(self, name: str, wheel: str, row: LawRow) -> EditedNetwork:
         """Return this network with a modulated through-source beside a wheel's slip element."""
-        slip = self.graph.branch(f'B_{wheel}')
+        slip = branch_of(self.graph, f'B_{wheel}')
         source = Branch(name, Kind.THROUGH_SOURCE, slip.domain, slip.tail, slip.head,
                         characteristic=_characteristic(row, (f'omega(B_{wheel})',)))
         return replace(self, graph=self.graph.with_branches(source),
@@ -98,26 +101,40 @@ class EditedNetwork:
 
 
 def _characteristic(row: LawRow, of: tuple[str, ...]) -> Characteristic:
-    return Characteristic(row.law.name.lower(), of,
-                          tuple(str(c) for c in row.coefficients))
+    texts = {f'p{i}': f'({c})' for i, c in enumerate(row.coefficients)}
+    expression = re.sub(r'\bp\d+\b', lambda match: texts[match.group()],
+                        EXPRESSIONS[row.law])
+    arguments = {f'z{i + 1}' for i in range(len(of))}
+    parameters = tuple(n for n in names_in(expression) if n not in arguments)
+    return Characteristic(expression, of, parameters,
+                          modulated=any(name in SIGNALS for name in parameters))
+
+
+def branch_of(graph: LinearGraph, name: str) -> Branch:
+    """Return the branch of that name."""
+    return next(branch for branch in graph.branches if branch.name == name)
+
+
+def _element_of(graph: LinearGraph, name: str) -> Branch | TwoPort:
+    return next(e for e in (*graph.branches, *graph.two_ports) if e.name == name)
 
 
 _MOTORS = (('1', 'L', '2'), ('2', 'R', '1'))
 _WHEELS = {'left': ('FL', 'RL'), 'right': ('FR', 'RR')}
-_LETTER = {'left': ('L',), 'right': ('R',), 'both': ('L', 'R')}
+_LETTER = {'left': ('L',), 'right': ('R',), 'both': ('L', 'R'), 'none': ('L', 'R')}
 
 
-def _axles(network: EditedNetwork, effect: Effect) -> list[tuple[str, Branch]]:
-    # Side letter and inertia on the motor's axle, for the effect's side.
+def _axles(network: EditedNetwork, side: str) -> list[tuple[str, Branch]]:
+    # Side letter and inertia on the motor's axle.
     names = {branch.name for branch in network.graph.branches}
-    return [(letter, network.graph.branch(
+    return [(letter, branch_of(network.graph, 
         f'J_{letter}W' if f'J_{letter}W' in names else f'J_R{letter}'))
-        for letter in _LETTER[effect.side]]
+        for letter in _LETTER[side]]
 
 
 def _electrical(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     for number, letter, other in _MOTORS:
-        axle = _axles(network, Effect('coulomb_drivetrain', 'both'))['LR'.index(letter)][1].name
+        axle = _axles(network, 'both')['LR'.index(letter)][1].name
         side = float('LR'.index(letter))
         voltage, current = f'V(V_S{number})', f'i(L_{number})'
         transmission = 'torque_constant*gear_ratio'
@@ -151,12 +168,11 @@ def _drivetrain(network: EditedNetwork, effect: Effect) -> EditedNetwork:
             return network.with_values({
                 f'B_{wheel}': 'wheel_damping*(1+damping_change)'
                 for wheel in _WHEELS[effect.side]})
-        letter, inertia = _axles(network, effect)[0]
+        letter, inertia = _axles(network, effect.side)[0]
         bearing = Branch(f'B_bearing_{letter}', Kind.D_TYPE, inertia.domain, inertia.tail,
                          inertia.head, 'extra_damping')
         return replace(network, graph=network.graph.with_branches(bearing))
-    for letter, inertia in _axles(
-            network, replace(effect, side='both') if effect.id == 'gear_backlash' else effect):
+    for letter, inertia in _axles(network, effect.side):
         number, side = ('1', 0.0) if letter == 'L' else ('2', 1.0)
         rate = f'omega({inertia.name})'
         rows: dict[str, tuple[Law, tuple[Coefficient, ...], tuple[str, ...]]] = {
@@ -174,13 +190,13 @@ def _drivetrain(network: EditedNetwork, effect: Effect) -> EditedNetwork:
 def _traction(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     if effect.id == 'traction_saturation':
         for wheel in (*_WHEELS['left'], *_WHEELS['right']):
-            damping = network.graph.branch(f'B_{wheel}').value
+            damping = branch_of(network.graph, f'B_{wheel}').value
             row = LawRow(Law.SLIP_SATURATION, ('traction_torque', str(damping)))
             network = network.with_slip_torque(f'T_slip_{wheel}', wheel, row)
         return network
     numbers = range(1, 5) if effect.side == 'left' else range(5, 9)
     return network.with_values({
-        f'TF_{n}': str(network.graph.two_port(f'TF_{n}').value).replace(
+        f'TF_{n}': str(_element_of(network.graph, f'TF_{n}').value).replace(
             'wheel_radius', '(wheel_radius*(1+radius_change))') for n in numbers})
 
 
@@ -189,9 +205,9 @@ def _chassis(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         return network.with_values({'M_H': 'mass+payload_mass',
                                     'J_H': 'yaw_inertia+payload_inertia'})
     if effect.id == 'terrain_change':
-        changed = {f'B_{wheel}': f'({network.graph.branch(f"B_{wheel}").value})'
+        changed = {f'B_{wheel}': f'({branch_of(network.graph, f"B_{wheel}").value})'
                    '*(1+wheel_damping_change)' for side in _WHEELS for wheel in _WHEELS[side]}
-        changed['B_H'] = f'({network.graph.branch("B_H").value})*(1+yaw_damping_change)'
+        changed['B_H'] = f'({branch_of(network.graph, "B_H").value})*(1+yaw_damping_change)'
         return network.with_values(changed)
     forward, yaw = 'v(M_H)', 'omega(J_H)'
     rows: dict[str, tuple[Law, tuple[Coefficient, ...], tuple[str, ...]]] = {
@@ -205,7 +221,7 @@ def _chassis(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         'yaw_pull': (Law.WHILE_MOVING, ('pull_moment', 'pull_speed'), (forward,)),
     }
     law, coefficients, of = rows[effect.id]
-    mass = network.graph.branch('M_H' if effect.kind.subsystem.value == 'translation' else 'J_H')
+    mass = branch_of(network.graph, 'M_H' if effect.kind.subsystem.value == 'translation' else 'J_H')
     return network.with_force(f'F_{effect.id}', mass.domain, mass.tail, mass.head,
                               LawRow(law, coefficients), of)
 

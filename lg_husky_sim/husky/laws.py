@@ -68,17 +68,28 @@ class Law(enum.IntEnum):
     """f = table over [p1, p2] with p3 knots p4..., of context p0 >= 0 or of z0 if p0 < 0."""
 
 
-@jit
-def _table(p: FloatArray, argument: float) -> float:
-    knots = int(p[3])
-    place = (argument - p[1]) / (p[2] - p[1]) * (knots - 1)
-    if place <= 0.0:
-        return float(p[4])
-    if place >= knots - 1:
-        return float(p[4 + knots - 1])
-    left = int(place)
-    share = place - left
-    return float(p[4 + left] * (1.0 - share) + p[5 + left] * share)
+#: The laws as expressions of the linear graph: arguments z1, z2, ..., coefficients p0, p1, ...
+#: and the context by name. Those modulated by the context or a memory are never folded into A.
+EXPRESSIONS = {
+    Law.COULOMB: '-p0*(1+p2*exp(-(z1/p3)**2))*tanh(z1/p1)',
+    Law.QUADRATIC: '-p0*z1*abs(z1)',
+    Law.WHILE_MOVING: 'p0*tanh(abs(z1)/p1)',
+    Law.MODULATED_DAMPING: '-p0*abs(z2)*z1',
+    Law.HEADING: 'p0*cos(heading)+p1*sin(heading)',
+    Law.WHEEL_PHASE: 'p0*cos(angle)+p1*sin(angle)+0*p2',
+    Law.SLIP_SATURATION: 'p0*tanh(p1*z1/p0)-p1*z1',
+    Law.CURRENT_LIMIT: '(abs(z1-p2*z2+p1*p0)-abs(z1-p2*z2-p1*p0))/2+p2*z2-z1',
+    Law.DEAD_ZONE: '-(abs(z1+p0)-abs(z1-p0))/2',
+    Law.DEAD_BAND: '-z1*(1-tanh((abs(z1)-p0)/p1))/2',
+    Law.CLIP: '(abs(z1+p0)-abs(z1-p0))/2-z1',
+    Law.BUS_SAG: '-z1/p1*p0*(z1*z3+z2*z4)/p1',
+    Law.DROOP: '-z1*((p0*time+p1)-abs(p0*time-p1))/2',
+    Law.HEATING: '-p0*heat*z1+0*p1+0*p2',
+    Law.BACKLASH: '-p1*in_play*z3+0*p0+0*p2+0*z1+0*z2',
+    Law.TABLE: 'table',
+}
+#: Names in the expressions that are signals, not parameters.
+SIGNALS = ('heading', 'angle', 'time', 'heat', 'in_play', 'table')
 
 
 @jit
@@ -87,42 +98,58 @@ def _clip(value: float, lower: float, upper: float) -> float:
 
 
 @jit
-def _source_law(law: int, p: FloatArray, z: FloatArray, o: int, memory: FloatArray,
-                time: float) -> float:
+def _table(coefficients: FloatArray, c: int, j: int, argument: float) -> float:
+    knots = int(coefficients[c, j, 3])
+    lower, upper = coefficients[c, j, 1], coefficients[c, j, 2]
+    place = (argument - lower) / (upper - lower) * (knots - 1)
+    if place <= 0.0:
+        return float(coefficients[c, j, 4])
+    if place >= knots - 1:
+        return float(coefficients[c, j, 3 + knots])
+    left = int(place)
+    share = place - left
+    return float(coefficients[c, j, 4 + left] * (1.0 - share)
+                 + coefficients[c, j, 5 + left] * share)
+
+
+@jit
+def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int,
+                memory: FloatArray, time: float) -> float:
     # Laws of the electrical side: what the driver adds to its own voltage.
+    own = z[o]
     if law == 7:
-        return _clip(z[o], p[2] * z[o + 1] - p[1] * p[0],
-                     p[2] * z[o + 1] + p[1] * p[0]) - z[o]
+        return _clip(own, p2 * z[o + 1] - p1 * p0, p2 * z[o + 1] + p1 * p0) - own
     if law == 8:
-        return math.copysign(max(abs(z[o]) - p[0], 0.0), z[o]) - z[o]
+        return math.copysign(max(abs(own) - p0, 0.0), own) - own
     if law == 9:
-        return -z[o] * 0.5 * (1.0 - math.tanh((abs(z[o]) - p[0]) / p[1]))
+        return -own * 0.5 * (1.0 - math.tanh((abs(own) - p0) / p1))
     if law == 10:
-        return _clip(z[o], -p[0], p[0]) - z[o]
+        return _clip(own, -p0, p0) - own
     if law == 11:
-        return -z[o] / p[1] * p[0] * (z[o] * z[o + 2] + z[o + 1] * z[o + 3]) / p[1]
+        return -own / p1 * p0 * (own * z[o + 2] + z[o + 1] * z[o + 3]) / p1
     if law == 12:
-        return -z[o] * min(p[0] * max(time, 0.0), p[1])
+        return -own * min(p0 * max(time, 0.0), p1)
     if law == 13:
-        return -p[0] * memory[int(p[2])] * z[o]
-    play = memory[2 + int(p[2])]
-    if abs(play) < 0.5 * p[0]:
-        return -p[1] * z[o + 2]
+        return -p0 * memory[int(p2)] * own
+    if abs(memory[2 + int(p2)]) < 0.5 * p0:
+        return -p1 * z[o + 2]
     return 0.0
 
 
 @jit
-def evaluate(laws: FloatArray, coefficients: FloatArray, offsets: FloatArray, z: FloatArray,
-             context: FloatArray, memory: FloatArray, out: FloatArray) -> None:
+def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatArray,
+             z: FloatArray, context: FloatArray, memory: FloatArray, out: FloatArray) -> None:
     """
     Evaluate every effort.
 
     Parameters
     ----------
-    laws : numpy.ndarray of int64, shape (n_efforts,)
+    c : int
+        Which set of laws.
+    laws : numpy.ndarray of int64, shape (n_sets, n_efforts)
         Numbers of :class:`Law`.
-    coefficients : numpy.ndarray, shape (n_efforts, WIDTH)
-    offsets : numpy.ndarray of int64, shape (n_efforts,)
+    coefficients : numpy.ndarray, shape (n_sets, n_efforts, WIDTH)
+    offsets : numpy.ndarray of int64, shape (n_sets, n_efforts)
         Where the arguments of each effort begin in ``z``.
     z : numpy.ndarray, shape (n_arguments,)
     context : numpy.ndarray, shape (CONTEXT,)
@@ -130,55 +157,56 @@ def evaluate(laws: FloatArray, coefficients: FloatArray, offsets: FloatArray, z:
     out : numpy.ndarray, shape (n_efforts,)
         Receives the efforts.
     """
-    for j in range(laws.size):
-        law = laws[j]
-        p = coefficients[j]
-        o = offsets[j]
+    for j in range(out.size):
+        law = laws[c, j]
+        p0, p1 = coefficients[c, j, 0], coefficients[c, j, 1]
+        p2 = coefficients[c, j, 2]
+        o = offsets[c, j]
         if law == 0:
-            level = p[0]
-            if p[2] != 0.0:
-                level *= 1.0 + p[2] * math.exp(-(z[o] / p[3]) ** 2)
-            out[j] = -level * math.tanh(z[o] / p[1])
+            level = p0
+            if p2 != 0.0:
+                level *= 1.0 + p2 * math.exp(-(z[o] / coefficients[c, j, 3]) ** 2)
+            out[j] = -level * math.tanh(z[o] / p1)
         elif law == 1:
-            out[j] = -p[0] * z[o] * abs(z[o])
+            out[j] = -p0 * z[o] * abs(z[o])
         elif law == 2:
-            out[j] = p[0] * math.tanh(abs(z[o]) / p[1])
+            out[j] = p0 * math.tanh(abs(z[o]) / p1)
         elif law == 3:
-            out[j] = -p[0] * abs(z[o + 1]) * z[o]
+            out[j] = -p0 * abs(z[o + 1]) * z[o]
         elif law == 4:
-            out[j] = p[0] * math.cos(context[1]) + p[1] * math.sin(context[1])
+            out[j] = p0 * math.cos(context[1]) + p1 * math.sin(context[1])
         elif law == 5:
-            angle = context[4 + int(p[2])]
-            out[j] = p[0] * math.cos(angle) + p[1] * math.sin(angle)
+            angle = context[4 + int(p2)]
+            out[j] = p0 * math.cos(angle) + p1 * math.sin(angle)
         elif law == 6:
-            out[j] = p[0] * math.tanh(p[1] * z[o] / p[0]) - p[1] * z[o]
+            out[j] = p0 * math.tanh(p1 * z[o] / p0) - p1 * z[o]
         elif law == 15:
-            selector = int(p[0])
-            out[j] = _table(p, z[o] if selector < 0 else context[selector])
+            selector = int(p0)
+            out[j] = _table(coefficients, c, j, z[o] if selector < 0 else context[selector])
         else:
-            out[j] = _source_law(law, p, z, o, memory, context[0])
+            out[j] = _source_law(law, p0, p1, p2, z, o, memory, context[0])
 
 
 @jit
-def remember(laws: FloatArray, coefficients: FloatArray, offsets: FloatArray, z: FloatArray,
-             memory: FloatArray, step: float) -> None:
+def remember(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatArray,
+             z: FloatArray, memory: FloatArray, step: float) -> None:
     """
     Advance the memories (motor heat, gear play) by ``step`` [s].
 
     Parameters
     ----------
-    laws, coefficients, offsets, z, memory
+    c, laws, coefficients, offsets, z, memory
         As in :func:`evaluate`; ``memory`` is changed.
     step : float
         Time [s].
     """
-    for j in range(laws.size):
-        p = coefficients[j]
-        o = offsets[j]
-        if laws[j] == 13:
-            side = int(p[2])
-            memory[side] += step * (z[o] * z[o] - memory[side] / p[1])
-        elif laws[j] == 14:
-            side = 2 + int(p[2])
-            half = 0.5 * p[0]
-            memory[side] = _clip(memory[side] + step * (z[o] / p[1] - z[o + 1]), -half, half)
+    for j in range(laws.shape[1]):
+        o = offsets[c, j]
+        if laws[c, j] == 13:
+            side = int(coefficients[c, j, 2])
+            memory[side] += step * (z[o] * z[o] - memory[side] / coefficients[c, j, 1])
+        elif laws[c, j] == 14:
+            side = 2 + int(coefficients[c, j, 2])
+            half = 0.5 * coefficients[c, j, 0]
+            memory[side] = _clip(
+                memory[side] + step * (z[o] / coefficients[c, j, 1] - z[o + 1]), -half, half)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 import enum
 from functools import lru_cache
@@ -13,13 +13,14 @@ import numpy as np
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky import network
-from lg_husky_sim.husky.edits import Coefficient, EditedNetwork, edit
+from lg_husky_sim.husky.edits import EditedNetwork, branch_of, edit
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.laws import WIDTH
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet, SensorModel
 from lg_husky_sim.husky.speed_loop import STATES as LOOP_STATES, close_speed_loop
-from lg_husky_sim.linear_graph import Expression, NumericModel, StateSpace, compile_numeric
+from lg_husky_sim.linear_graph import NumericModel, StateSpace, compile_numeric
+from lg_husky_sim.linear_graph.expressions import GLOBALS, compile_tuple
 
 
 class Drivetrain(enum.Enum):
@@ -93,13 +94,6 @@ def _outputs(edited: EditedNetwork) -> tuple[str, ...]:
     return (f'omega({left})', f'omega({right})', 'v(M_H)', 'omega(J_H)', 'i(L_1)', 'i(L_2)')
 
 
-def _number(coefficient: Coefficient) -> Callable[[Mapping[str, float]], float]:
-    if isinstance(coefficient, str):
-        return Expression(coefficient).evaluate
-    value = float(coefficient)
-    return lambda values: value
-
-
 class _Regime:
     """One network, analysed; gives a :class:`PlantSet` for numbers."""
 
@@ -108,8 +102,9 @@ class _Regime:
         self.numeric: NumericModel = compile_numeric(edited.graph, _outputs(edited))
         rows = [edited.laws[name] for name in self.numeric.efforts]
         self._laws = np.array([int(row.law) for row in rows], dtype=np.int64)
-        self._numbers = [[_number(c) for c in row.coefficients] for row in rows]
-        counts = [len(edited.graph.branch(name).characteristic.of)  # type: ignore[union-attr]
+        self._places = [(j, i) for j, row in enumerate(rows) for i in range(len(row.coefficients))]
+        self._code = compile_tuple(tuple(str(c) for row in rows for c in row.coefficients))
+        counts = [len(branch_of(edited.graph, name).characteristic.of)  # type: ignore[union-attr]
                   for name in self.numeric.efforts]
         self._offsets = np.cumsum([0, *counts], dtype=np.int64)[:-1]
         self._volts = np.zeros((2, len(rows)))
@@ -119,11 +114,10 @@ class _Regime:
 
     def at(self, values: Mapping[str, float]) -> PlantSet:
         space: StateSpace = self.numeric.at(values)
-        count = len(self._numbers)
-        coefficients = np.zeros((count, WIDTH))
-        for j, numbers in enumerate(self._numbers):
-            for i, number in enumerate(numbers):
-                coefficients[j, i] = number(values)
+        coefficients = np.zeros((self._laws.size, WIDTH))
+        for place, number in zip(self._places, eval(self._code, dict(GLOBALS), values),
+                                 strict=True):
+            coefficients[place] = number
         forward = space.C[2]
         rows = np.vstack([space.C, forward @ space.A, np.zeros((2, space.A.shape[0]))])
         rows_u = np.vstack([space.D, forward @ space.B, np.eye(2)])

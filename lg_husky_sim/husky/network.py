@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from lg_husky_sim.linear_graph import Branch, Domain, Kind, LinearGraph, TwoPort
 
+#: Reference nodes.
+GROUNDS = {Domain.ELECTRICAL: 'e', Domain.ROTATIONAL: 'r', Domain.TRANSLATIONAL: 't'}
 #: Motor number, side letter, wheels (position letter, odd and even transformer, lever arm).
 _SIDES = (
     ('1', 'L', '-', (('R', 1, 2), ('F', 3, 4))),
@@ -83,7 +85,7 @@ def simplified() -> LinearGraph:
             slip, pair = _wheel(side, sign, position, odd, even, axle)
             rest.append(slip)
             ports.extend(pair)
-    return LinearGraph((*inertias, *_chassis(), *rest), tuple(ports))
+    return LinearGraph((*inertias, *_chassis(), *rest), tuple(ports), GROUNDS)
 
 
 def expanded() -> LinearGraph:
@@ -115,4 +117,4 @@ def expanded() -> LinearGraph:
             slip, pair = _wheel(side, sign, position, odd, even, axle)
             rest.append(slip)
             ports.extend(pair)
-    return LinearGraph((*inertias, *_chassis(), *rest), tuple(ports))
+    return LinearGraph((*inertias, *_chassis(), *rest), tuple(ports), GROUNDS)

@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from lg_husky_sim.husky.effects import OnsetKind
 from lg_husky_sim.husky.laws import WIDTH
@@ -47,6 +46,32 @@ class Operators:
     substeps: int
     n: int
     arguments: tuple[object, ...]
+
+
+def expm(matrix: FloatArray) -> FloatArray:
+    """
+    Return the exponential of a small matrix by scaling, Taylor series and squaring.
+
+    Products only: a linear solve of this size wakes a threaded LAPACK's workers, which costs far
+    more than the exponential itself.
+
+    Parameters
+    ----------
+    matrix : numpy.ndarray, shape (m, m)
+
+    Returns
+    -------
+    numpy.ndarray, shape (m, m)
+    """
+    norm = float(np.max(np.sum(np.abs(matrix), axis=1)))
+    squarings = max(0, math.ceil(math.log2(norm / 0.5))) if norm > 0.5 else 0
+    scaled = matrix / 2.0 ** squarings
+    result = np.eye(matrix.shape[0])
+    for order in range(14, 0, -1):
+        result = np.eye(matrix.shape[0]) + scaled @ result / order
+    for _ in range(squarings):
+        result = result @ result
+    return result
 
 
 def _held(plant: PlantSet) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -47,38 +47,37 @@ COMMAND = 10
 
 
 @jit
-def _shaped(s: FloatArray, base: int, forward: float, yaw: float, stage: FloatArray
-            ) -> tuple[float, float]:
+def _shaped(s: FloatArray, base: int, forward: float, yaw: float, stages: FloatArray,
+            chosen: int) -> tuple[float, float]:
     # Latency (linear between steps), then limits, then slew.
     place = int(s[base + 2])
     line = base + 3
     s[line + place] = forward
     s[line + DELAY + place] = yaw
     s[base + 2] = (place + 1) % DELAY
-    whole = int(stage[0])
-    share = stage[0] - whole
+    whole = int(stages[chosen, 0])
+    share = stages[chosen, 0] - whole
     near = (place - whole) % DELAY
     far = (place - whole - 1) % DELAY
     forward = (1.0 - share) * s[line + near] + share * s[line + far]
     yaw = (1.0 - share) * s[line + DELAY + near] + share * s[line + DELAY + far]
-    forward = max(-stage[3], min(stage[3], forward))
-    yaw = max(-stage[4], min(stage[4], yaw))
-    forward = s[base] + max(-stage[1], min(stage[1], forward - s[base]))
-    yaw = s[base + 1] + max(-stage[2], min(stage[2], yaw - s[base + 1]))
+    forward = max(-stages[chosen, 3], min(stages[chosen, 3], forward))
+    yaw = max(-stages[chosen, 4], min(stages[chosen, 4], yaw))
+    forward = s[base] + max(-stages[chosen, 1], min(stages[chosen, 1], forward - s[base]))
+    yaw = s[base + 1] + max(-stages[chosen, 2], min(stages[chosen, 2], yaw - s[base + 1]))
     s[base] = forward
     s[base + 1] = yaw
     return forward, yaw
 
 
 @jit
-def _multiply(matrix: FloatArray, vector: FloatArray, out: FloatArray) -> None:
-    # out += matrix.T @ vector for a matrix stored with one row a column of the operator.
-    for j in range(vector.size):
+def _multiply(matrices: FloatArray, c: int, first: int, vector: FloatArray, count: int,
+              out: FloatArray) -> None:
+    # out += operator @ vector[:count]; row first + j of the stored matrix is column j of it.
+    for j in range(count):
         value = vector[j]
-        if value != 0.0:
-            row = matrix[j]
-            for i in range(out.size):
-                out[i] += row[i] * value
+        for i in range(out.size):
+            out[i] += matrices[c, first + j, i] * value
 
 
 @jit
@@ -168,6 +167,7 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
     inside = np.zeros(nodes.shape[2])
     row = np.zeros(9)
     memory = s[n + 7:n + 11]
+    count = weights.size
     for step in range(commands.shape[0]):
         chosen = 0
         if onset[0] == 1.0 and s[n + 6] >= onset[1] - 0.5 * period:
@@ -176,19 +176,19 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
             chosen = 1
         elif onset[0] == 3.0 and s[n + 4] <= onset[1]:
             chosen = 1
-        stage = stages[chosen]
-        forward, yaw = _shaped(s, n + 11, commands[step, 0], commands[step, 1], stage)
-        u[0] = stage[5] * forward + stage[6] * yaw
-        u[1] = stage[7] * forward + stage[8] * yaw
-        if stage[9] > 0.0:
-            u[0] = max(-stage[9], min(stage[9], u[0]))
-            u[1] = max(-stage[9], min(stage[9], u[1]))
+        forward, yaw = _shaped(s, n + 11, commands[step, 0], commands[step, 1], stages, chosen)
+        u[0] = stages[chosen, 5] * forward + stages[chosen, 6] * yaw
+        u[1] = stages[chosen, 7] * forward + stages[chosen, 8] * yaw
+        clamp = stages[chosen, 9]
+        if clamp > 0.0:
+            u[0] = max(-clamp, min(clamp, u[0]))
+            u[1] = max(-clamp, min(clamp, u[1]))
         for part in range(substeps):
             for i in range(n4):
                 start[i] = s[i]
                 end[i] = 0.0
-            _multiply(phi[chosen], start, end)
-            _multiply(gamma_u[chosen], u, end)
+            _multiply(phi, chosen, 0, start, n4, end)
+            _multiply(gamma_u, chosen, 0, u, 2, end)
             if efforts > 0:
                 context[0] = s[n + 6]
                 context[1] = s[n + 3]
@@ -196,44 +196,45 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
                 context[3] = s[n + 5]
                 context[4] = s[n]
                 context[5] = s[n + 1]
-                z[:] = 0.0
-                _multiply(h[chosen], start[:n], z)
-                _multiply(k[chosen], u, z)
-                evaluate(laws[chosen], coefficients[chosen], offsets[chosen], z, context,
-                         memory, f0)
-                _multiply(gamma_1[chosen], f0, end)
-                z[:] = 0.0
-                _multiply(h[chosen], end[:n], z)
-                _multiply(k[chosen], u, z)
+                for i in range(z.size):
+                    z[i] = 0.0
+                _multiply(h, chosen, 0, start, n, z)
+                _multiply(k, chosen, 0, u, 2, z)
+                evaluate(chosen, laws, coefficients, offsets, z, context, memory, f0)
+                _multiply(gamma_1, chosen, 0, f0, efforts, end)
+                for i in range(z.size):
+                    z[i] = 0.0
+                _multiply(h, chosen, 0, end, n, z)
+                _multiply(k, chosen, 0, u, 2, z)
                 context[0] += period / substeps
                 context[1] = end[n + 3]
                 context[4] = end[n]
                 context[5] = end[n + 1]
-                evaluate(laws[chosen], coefficients[chosen], offsets[chosen], z, context,
-                         memory, f1)
+                evaluate(chosen, laws, coefficients, offsets, z, context, memory, f1)
                 for j in range(efforts):
                     f1[j] -= f0[j]
-                _multiply(gamma_2[chosen], f1, end)
-                remember(laws[chosen], coefficients[chosen], offsets[chosen], z, memory,
-                         period / substeps)
-            if weights.size > 0:
-                inside[:] = 0.0
-                _multiply(nodes[chosen, :n4], start, inside)
-                _multiply(nodes[chosen, n4:n4 + 2], u, inside)
+                _multiply(gamma_2, chosen, 0, f1, efforts, end)
+                remember(chosen, laws, coefficients, offsets, z, memory, period / substeps)
+            if count > 0:
+                for i in range(inside.size):
+                    inside[i] = 0.0
+                _multiply(nodes, chosen, 0, start, n4, inside)
+                _multiply(nodes, chosen, n4, u, 2, inside)
                 if efforts > 0:
-                    _multiply(nodes[chosen, n4 + 2:n4 + 2 + efforts], f0, inside)
-                    _multiply(nodes[chosen, n4 + 2 + efforts:], f1, inside)
+                    _multiply(nodes, chosen, n4 + 2, f0, efforts, inside)
+                    _multiply(nodes, chosen, n4 + 2 + efforts, f1, efforts, inside)
             _pose(s, n, start, end, inside, weights)
             for i in range(n4):
                 s[i] = end[i]
             s[n + 6] += period / substeps
         for j in range(efforts):
             f0[j] += f1[j]
-        row[:] = 0.0
-        _multiply(rows[chosen], s[:n], row)
-        _multiply(rows_u[chosen], u, row)
+        for i in range(9):
+            row[i] = 0.0
+        _multiply(rows, chosen, 0, s, n, row)
+        _multiply(rows_u, chosen, 0, u, 2, row)
         if efforts > 0:
-            _multiply(rows_f[chosen], f0, row)
+            _multiply(rows_f, chosen, 0, f0, efforts, row)
         for i in range(7):
             out[step, i] = row[i]
         for i in range(6):

@@ -1,0 +1,438 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Recorded segments as one vector of measurements, and the model's prediction of it.
+
+Every channel keeps its own stamps. The pose enters as increments over a window, taken in the
+body's frame at mid-heading, so that errors do not accumulate; the simulated pose is set back to
+the measured one every few seconds, so that physics that depends on heading or place acts where
+the robot really was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lg_husky_sim.errors import RecordingError
+from lg_husky_sim.husky.plant import Plant, SensorModel
+from lg_husky_sim.recording import Segment
+from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
+from lg_husky_sim.simulation.kernel import COLUMNS, run
+from lg_husky_sim.simulation.simulator import Simulator, hold
+
+#: Grid of the simulation [s].
+PERIOD = 0.01
+#: Window of a pose increment [s].
+WINDOW = 0.2
+#: Time between two resets of the simulated pose to the measured one [s].
+RESET = 4.0
+#: Data after the start of a moving segment that are not used [s]: its initial state is unknown.
+SETTLE = 0.6
+#: Highest rate that a channel is used at [1/s]; faster ones are thinned.
+FASTEST = 55.0
+#: Channels in the order of the measurement vector.
+CHANNELS = ('wheel_left', 'wheel_right', 'yaw_rate', 'advance', 'turn')
+UNITS = {'wheel_left': 'rad/s', 'wheel_right': 'rad/s', 'yaw_rate': 'rad/s',
+         'advance': 'm/s', 'turn': 'rad/s'}
+_COLUMN = {name: i for i, name in enumerate(COLUMNS)}
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """
+    One channel of one segment.
+
+    Parameters
+    ----------
+    name : str
+        One of :data:`CHANNELS`.
+    times : numpy.ndarray, shape (n,)
+        Stamps [s] on the recording's clock; for increments, the ends of the windows.
+    values : numpy.ndarray, shape (n,)
+        Measured; increments are divided by their window [unit of :data:`UNITS`].
+    begins : numpy.ndarray, shape (n,)
+        For increments, the begins of the windows [s]; else equal to ``times``.
+    """
+
+    name: str
+    times: FloatArray
+    values: FloatArray
+    begins: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """
+    A segment, ready to be simulated.
+
+    Parameters
+    ----------
+    recording : str
+    index : int
+        Of the segment in its recording.
+    start : float
+        Time of the first grid point [s].
+    count : int
+        Steps of the grid.
+    commands : TimeSeries
+    channels : tuple of Channel
+    pose : TimeSeries or None
+        Measured, for the start and the resets.
+    twist : BodyTwist
+        First guess of the initial velocity.
+    wheel_rates : tuple of float
+    wheel_angles : tuple of float
+        Initial angles [rad]; zero where no positions were recorded.
+    """
+
+    recording: str
+    index: int
+    start: float
+    count: int
+    commands: TimeSeries
+    channels: tuple[Channel, ...]
+    pose: TimeSeries | None
+    twist: BodyTwist
+    wheel_rates: tuple[float, float]
+    wheel_angles: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Slice:
+    """Where one channel of one piece lies in the measurement vector."""
+
+    piece: int
+    channel: str
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """
+    All pieces, and their measurements as one vector.
+
+    Parameters
+    ----------
+    pieces : tuple of Piece
+    measured : numpy.ndarray, shape (n_values,)
+    times : numpy.ndarray, shape (n_values,)
+        Stamp of each value on its recording's clock [s].
+    slices : tuple of Slice
+        In the order of the vector.
+    """
+
+    pieces: tuple[Piece, ...]
+    measured: FloatArray = field(init=False)
+    times: FloatArray = field(init=False)
+    slices: tuple[Slice, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Stack the measurements."""
+        values, times, slices, at = [np.zeros(0)], [np.zeros(0)], [], 0
+        for number, piece in enumerate(self.pieces):
+            for channel in piece.channels:
+                values.append(channel.values)
+                times.append(channel.times)
+                slices.append(Slice(number, channel.name, at, at + channel.values.size))
+                at += channel.values.size
+        object.__setattr__(self, 'measured', np.concatenate(values))
+        object.__setattr__(self, 'times', np.concatenate(times))
+        object.__setattr__(self, 'slices', tuple(slices))
+
+    def channel_mask(self, name: str) -> NDArray[np.bool_]:
+        """Return which values belong to a channel, shape (n_values,)."""
+        mask = np.zeros(self.measured.size, dtype=bool)
+        for one in self.slices:
+            if one.channel == name:
+                mask[one.first:one.last] = True
+        return mask
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels that occur, in the order of :data:`CHANNELS`."""
+        present = {one.channel for one in self.slices}
+        return tuple(name for name in CHANNELS if name in present)
+
+    def predict(self, plant: Plant, extra: Mapping[str, float] | None = None) -> FloatArray:
+        """
+        Return the model's prediction of the measurement vector.
+
+        Parameters
+        ----------
+        plant : Plant
+        extra : mapping of str to float, optional
+            Small unknowns of the observation that belong to no effect: latency,
+            delay_wheels, delay_imu, delay_pose [s], gyro_bias [rad/s].
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_values,)
+        """
+        simulator = Simulator(plant, PERIOD, fine_pose=False)
+        given = extra or {}
+        parts = []
+        for piece in self.pieces:
+            grid = simulate_piece(simulator, piece, given.get('latency', 0.0))
+            parts.append(_observe(piece, plant, grid, given))
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def subset(self, keep: Sequence[bool]) -> Observations:
+        """Return the observations of some of the pieces."""
+        return Observations(tuple(p for p, k in zip(self.pieces, keep, strict=True) if k))
+
+
+def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0) -> FloatArray:
+    """
+    Simulate a piece on its grid.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        At :data:`PERIOD`.
+    piece : Piece
+    latency : float
+        Further dead time of the commands [s].
+
+    Returns
+    -------
+    numpy.ndarray, shape (count + 1, 15)
+        The kernel's columns; pose columns follow the measured pose at the resets.
+    """
+    commands = piece.commands
+    if latency:
+        commands = TimeSeries(commands.times + latency, commands.values, commands.names)
+    held = hold(commands, piece.start, PERIOD, piece.count)
+    state = simulator.initial(_pose_at(piece.pose, piece.start), piece.twist, piece.start,
+                              piece.wheel_rates, piece.wheel_angles)
+    flat = np.array(state.flat)
+    if len(commands) and commands.times[0] <= piece.start + PERIOD:
+        _fill_command(flat, state.n, held)
+    out = np.empty((piece.count + 1, len(COLUMNS)))
+    out[0] = state.row
+    stride = max(1, round(RESET / PERIOD)) if piece.pose is not None else piece.count or 1
+    for first in range(0, piece.count, stride):
+        last = min(first + stride, piece.count)
+        if piece.pose is not None and first:
+            now = _pose_at(piece.pose, piece.start + first * PERIOD)
+            flat[state.n + 3:state.n + 6] = now.heading, now.x, now.y
+        run(flat, held[first:last], out[first + 1:last + 1],
+            *simulator.operators.arguments)  # type: ignore[arg-type]
+    return out
+
+
+def _fill_command(flat: FloatArray, n: int, held: FloatArray) -> None:
+    # What was commanded before a segment is taken to be its first command.
+    from lg_husky_sim.simulation.kernel import DELAY
+    base = n + 11
+    flat[base:base + 2] = held[0]
+    flat[base + 3:base + 3 + DELAY] = held[0, 0]
+    flat[base + 3 + DELAY:] = held[0, 1]
+
+
+def _pose_at(pose: TimeSeries | None, time: float) -> Pose:
+    if pose is None:
+        return Pose()
+    return Pose(*(float(np.interp(time, pose.times, pose.values[:, i])) for i in range(3)))
+
+
+def _sample(column: FloatArray, start: float, times: FloatArray) -> FloatArray:
+    place = np.clip((times - start) / PERIOD, 0.0, column.size - 1.000001)
+    left = place.astype(np.int64)
+    share = place - left
+    sampled: FloatArray = column[left] * (1.0 - share) + column[left + 1] * share
+    return sampled
+
+
+def _observe(piece: Piece, plant: Plant, grid: FloatArray, extra: Mapping[str, float]
+             ) -> FloatArray:
+    rates = grid[:, _COLUMN['yaw_rate']]
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (rates[1:] + rates[:-1])) * PERIOD])
+    parts = []
+    for channel in piece.channels:
+        seen = [_seen(channel, piece, grid, angle, one.sensors, extra) for one in plant.sets]
+        value = seen[0]
+        if len(seen) > 1 and plant.onset is not None:
+            value = np.where(late_mask(plant, piece, channel.times), seen[1], seen[0])
+        parts.append(value)
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def late_mask(plant: Plant, piece: Piece, times: FloatArray) -> NDArray[np.bool_]:
+    """
+    Return at which stamps the late effects of a plant are on.
+
+    Parameters
+    ----------
+    plant : Plant
+    piece : Piece
+    times : numpy.ndarray, shape (n,)
+        On the recording's clock [s].
+
+    Returns
+    -------
+    numpy.ndarray of bool, shape (n,)
+    """
+    onset = plant.onset
+    if onset is None:
+        return np.zeros(times.size, dtype=bool)
+    if onset.kind.value == 'time':
+        return times >= onset.value
+    if piece.pose is None:
+        return np.zeros(times.size, dtype=bool)
+    x = np.interp(times, piece.pose.times, piece.pose.column('x'))
+    return x >= onset.value if onset.kind.value == 'place_above' else x <= onset.value
+
+
+def _seen(channel: Channel, piece: Piece, grid: FloatArray, angle: FloatArray,
+          sensors: SensorModel, extra: Mapping[str, float]) -> FloatArray:
+    start, name = piece.start, channel.name
+    if name in ('wheel_left', 'wheel_right'):
+        late = sensors.delay_wheels + extra.get('delay_wheels', 0.0)
+        factor = sensors.encoder_left if name == 'wheel_left' else sensors.encoder_right
+        return factor * _sample(grid[:, _COLUMN[name]], start, channel.times - late)
+    if name == 'yaw_rate':
+        late = sensors.delay_imu + extra.get('delay_imu', 0.0)
+        rate = _sample(grid[:, _COLUMN[name]], start, channel.times - late)
+        return sensors.gyro_factor * rate + sensors.gyro_bias + extra.get('gyro_bias', 0.0)
+    late = sensors.delay_pose + extra.get('delay_pose', 0.0)
+    span = channel.times - channel.begins
+    turn = (_sample(angle, start, channel.times - late)
+            - _sample(angle, start, channel.begins - late))
+    if name == 'turn':
+        return turn / span
+    distance = grid[:, _COLUMN['distance']]
+    way = (_sample(distance, start, channel.times - late)
+           - _sample(distance, start, channel.begins - late))
+    chord: FloatArray = way * np.sinc(turn / (2.0 * np.pi)) / span
+    return chord
+
+
+def _thinned(times: FloatArray) -> slice:
+    if times.size < 3:
+        return slice(None)
+    step = float(np.median(np.diff(times)))
+    return slice(None, None, max(1, math.ceil(1.0 / (step * FASTEST)))) if step > 0.0 else (
+        slice(None))
+
+
+def _increments(pose: TimeSeries, start: float) -> tuple[Channel, ...]:
+    times = pose.times
+    picked = [int(np.searchsorted(times, start, side='left'))]
+    while picked[-1] < times.size:
+        following = int(np.searchsorted(times, times[picked[-1]] + WINDOW * 0.98, side='left'))
+        if following >= times.size:
+            break
+        picked.append(following)
+    if len(picked) < 2:
+        return ()
+    at = np.array(picked)
+    here, there = at[:-1], at[1:]
+    near = times[there] - times[here] < 3.0 * WINDOW
+    here, there = here[near], there[near]
+    x, y, heading = (pose.column(n) for n in ('x', 'y', 'heading'))
+    middle = 0.5 * (heading[here] + heading[there])
+    span = times[there] - times[here]
+    advance = ((x[there] - x[here]) * np.cos(middle) + (y[there] - y[here]) * np.sin(middle))
+    return (Channel('advance', times[there], advance / span, times[here]),
+            Channel('turn', times[there], (heading[there] - heading[here]) / span, times[here]))
+
+
+def _initial(series: TimeSeries | None, names: tuple[str, ...], start: float
+             ) -> tuple[float, ...]:
+    if series is None or not len(series):
+        return tuple(0.0 for _ in names)
+    early = series.slice(start, start + 0.15)
+    values = early if len(early) else series
+    return tuple(float(np.median(values.column(n)[:8])) for n in names)
+
+
+def piece_of(segment: Segment) -> Piece | None:
+    """
+    Prepare a segment.
+
+    Parameters
+    ----------
+    segment : Segment
+
+    Returns
+    -------
+    Piece or None
+        None if it is too short or has no command or no measurement.
+    """
+    streams = segment.streams
+    if 'command' not in streams or segment.duration < 2.0 * SETTLE:
+        return None
+    start = segment.start
+    count = math.ceil((segment.end - start) / PERIOD)
+    wheels, imu, pose = (streams.get(n) for n in ('wheels', 'imu', 'pose'))
+    rates = _initial(wheels, ('left', 'right'), start)
+    yaw = _initial(imu, ('yaw_rate',), start)[0]
+    channels: list[Channel] = []
+    forward = 0.0
+    if pose is not None and len(pose) > 3:
+        increments = _increments(pose, start)
+        channels.extend(increments)
+        if increments and increments[0].values.size:
+            forward = float(increments[0].values[0])
+            yaw = yaw if imu is not None else float(increments[1].values[0])
+    still = abs(forward) < 0.05 and abs(yaw) < 0.05 and max(map(abs, rates)) < 0.3
+    begin = start if still else start + SETTLE
+    if wheels is not None:
+        part = _thinned(wheels.times)
+        channels = [*(Channel(f'wheel_{side}', wheels.times[part], wheels.column(side)[part],
+                              wheels.times[part]) for side in ('left', 'right')), *channels]
+    if imu is not None:
+        part = _thinned(imu.times)
+        channels.append(Channel('yaw_rate', imu.times[part], imu.column('yaw_rate')[part],
+                                imu.times[part]))
+    kept = tuple(_after(channel, begin) for channel in channels)
+    kept = tuple(sorted((c for c in kept if c.values.size > 3),
+                        key=lambda c: CHANNELS.index(c.name)))
+    if not kept:
+        return None
+    angles = streams.get('wheel_angles')
+    start_angles = (0.0, 0.0)
+    if angles is not None and len(angles):
+        start_angles = (float(np.interp(start, angles.times, angles.column('left'))),
+                        float(np.interp(start, angles.times, angles.column('right'))))
+    return Piece(segment.recording, segment.index, start, count, streams['command'], kept,
+                 pose if pose is not None and len(pose) > 3 else None,
+                 BodyTwist() if still else BodyTwist(forward, yaw),
+                 (0.0, 0.0) if still else (rates[0], rates[1]), start_angles)
+
+
+def _after(channel: Channel, begin: float) -> Channel:
+    use = (channel.begins >= begin) & np.isfinite(channel.values)
+    return Channel(channel.name, channel.times[use], channel.values[use], channel.begins[use])
+
+
+def observations(segments: Sequence[Segment]) -> Observations:
+    """
+    Prepare segments.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+
+    Returns
+    -------
+    Observations
+
+    Raises
+    ------
+    RecordingError
+        If none of them can be used.
+    """
+    pieces = tuple(p for p in map(piece_of, segments) if p is not None)
+    if not pieces:
+        names = ', '.join(sorted({s.recording for s in segments})) or 'nothing'
+        raise RecordingError(
+            f'no usable segment in {names}: a segment needs commands, {2 * SETTLE:g} s of data '
+            'and wheel rates, a gyro or a pose')
+    return Observations(pieces)
