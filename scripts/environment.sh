@@ -2,9 +2,12 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 # Sourced by ./run and ./check: makes the project's own Python environment, once, and says how.
+# The caller sets $root, the folder of the clone.
 #
 #   LG_HUSKY_VENV    folder of the environment (default: .venv here, .venv-<distro> with ROS)
 #   LG_HUSKY_PYTHON  interpreter to make it with (default: python3, else python3.12, python3.11)
+
+: "${root:?}"
 
 fail() {
     printf 'error: %s\n' "$1" >&2
@@ -64,6 +67,16 @@ show_progress() {
     fi
 }
 
+install_project() {
+    # install_project LOG [OPTION...]: what is needed, from the network unless options say no.
+    local log=$1
+    shift
+    PIP_RETRIES=${PIP_RETRIES:-2} PIP_DISABLE_PIP_VERSION_CHECK=1 "$venv/bin/python" -m pip \
+        install --progress-bar off "${constraints[@]}" "$@" --editable "${root}[${extra}]" 2>&1 |
+        tee "$log" | show_progress
+    grep -q '^Successfully installed .*lg[-_]husky[-_]sim' "$log"
+}
+
 make_environment() {
     # make_environment EXTRA: sets $venv to an environment with the project and that extra.
     local extra=$1 python log options=() constraints=()
@@ -90,30 +103,28 @@ make_environment() {
     # An environment of a clone that has moved, or of a Python that has gone, is made anew.
     if [ -e "$venv" ] && { ! "$venv/bin/python" -c '' 2>/dev/null ||
             ! head -n 1 "$venv/bin/pip" 2>/dev/null | grep -qF "$venv/bin/python"; }; then
-        [ -f "$venv/pyvenv.cfg" ] || fail "$venv exists and is no Python environment; remove it, \
-or name another folder in LG_HUSKY_VENV"
+        [ -f "$venv/.lg_husky_made" ] || fail "$venv is no working Python environment with pip, and \
+not of our making; remove it, or name another folder in LG_HUSKY_VENV"
         rm -rf "$venv"
     fi
     if [ ! -x "$venv/bin/python" ]; then
         "$python" -c 'import ensurepip, venv' 2>/dev/null ||
             fail "$python has no venv module; on Debian or Ubuntu: sudo apt install python3-venv"
         echo "setting up $venv with $("$python" -V 2>&1) (once; a few minutes, some 600 MB)" >&2
+        mkdir -p "$venv" && touch "$venv/.lg_husky_made"
         "$python" -m venv "${options[@]}" "$venv" || fail "could not make $venv"
     else
         echo "updating $venv" >&2
     fi
     log=$venv/install.log
-    if ! PIP_RETRIES=${PIP_RETRIES:-2} PIP_DISABLE_PIP_VERSION_CHECK=1 "$venv/bin/python" -m pip \
-            install --progress-bar off "${constraints[@]}" --editable "$root[$extra]" 2>&1 |
-            tee "$log" | show_progress; then :; fi
-    if ! grep -q '^Successfully installed .*lg[-_]husky[-_]sim' "$log"; then
+    install_project "$log" || install_project "$log.offline" --no-index --no-build-isolation || {
         grep '^ERROR' "$log" | tail -n 3 >&2
         if grep -qiE 'NewConnectionError|name resolution|Network is unreachable|Connection (refused|timed out|reset)|ReadTimeout|ProxyError|Name or service not known|Max retries' "$log"; then
             fail "there is no network to install from: connect, or set LG_HUSKY_VENV to an \
 environment that has everything (full log: $log)"
         fi
         fail "installing failed; full log: $log"
-    fi
+    }
     stamp_of "$extra" >"$venv/.lg_husky_$extra"
     # The environment of ./check has all that ./run needs.
     [ "$extra" = check ] && stamp_of run >"$venv/.lg_husky_run"

@@ -11,7 +11,6 @@ import os
 import sys
 
 import click
-
 from lg_husky_sim.errors import LgHuskyError
 
 INTERRUPTED = 130
@@ -49,6 +48,15 @@ class LazyGroup(click.Group):
             message = f'{VERBS[cmd_name]}.command is no click command'
             raise TypeError(message)
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str],
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        verb = args[0]
+        if not verb.startswith('-') and verb not in self.list_commands(ctx):
+            message = f'{verb} is no verb; there are: {", ".join(self.list_commands(ctx))}'
+            raise click.UsageError(message, ctx)
+        return super().resolve_command(ctx, args)
 
 
 def version() -> str:

@@ -1,0 +1,44 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Optional dependencies: say in one line what to install where one is missing."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from lg_husky_sim.errors import MissingExtraError
+
+EXTRA_OF = {
+    'cyclonedds': 'dds',
+    'dask': 'scale',
+    'distributed': 'scale',
+    'jinja2': 'report',
+    'matplotlib': 'plot',
+    'mujoco': 'engine',
+    'numba': 'fast',
+    'rosbags': 'bags',
+}
+"""Importable module to the extra of setup.py that brings it."""
+
+
+def require(module: str, purpose: str) -> None:
+    """
+    Refuse to go on without an optional dependency; call it just before importing it.
+
+    Parameters
+    ----------
+    module : str
+        One of `EXTRA_OF`.
+    purpose : str
+        What it is needed for, after "needed to", such as ``read recordings``.
+
+    Raises
+    ------
+    MissingExtraError
+        The module is not installed; the message says how to install it.
+
+    """
+    if find_spec(module) is None:
+        message = f'{module} is needed to {purpose} and is not installed: ' \
+                  f"pip install 'lg_husky_sim[{EXTRA_OF[module]}]'"
+        raise MissingExtraError(message)

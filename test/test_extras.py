@@ -1,0 +1,56 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A missing optional dependency is one line that says what to install."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+import subprocess
+import sys
+
+from lg_husky_sim.errors import MissingExtraError
+from lg_husky_sim.extras import EXTRA_OF, require
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+WITHOUT = 'import sys\nsys.modules.update(dict.fromkeys({names}))\n'
+
+
+def test_present_module_passes() -> None:
+    require('numba', 'be quick')
+
+
+def test_absent_module_names_extra_and_purpose(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('lg_husky_sim.extras.find_spec', lambda name: None)
+    with pytest.raises(MissingExtraError, match=(
+            r'^rosbags is needed to read recordings and is not installed: '
+            r"pip install 'lg_husky_sim\[bags\]'$")):
+        require('rosbags', 'read recordings')
+
+
+def test_each_module_belongs_to_an_extra_that_setup_offers() -> None:
+    setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
+    for module, extra in EXTRA_OF.items():
+        assert f"'{extra}': [" in setup, module
+
+
+def modules_below(part: str) -> list[str]:
+    folder = ROOT / 'lg_husky_sim' / part
+    return [f'lg_husky_sim.{part}.{path.stem}' for path in sorted(folder.glob('*.py'))
+            if path.stem != '__init__']
+
+
+@pytest.mark.parametrize('part', [
+    path.parent.name for path in sorted((ROOT / 'lg_husky_sim').glob('*/__init__.py'))
+    if path.parent.name not in {'ros', 'testing'}
+])
+def test_every_module_imports_without_the_extras(part: str) -> None:
+    """Only the backends of the live node may need more than the core."""
+    names = modules_below(part)
+    assert names
+    ask = WITHOUT.format(names=sorted(EXTRA_OF)) + '\n'.join(f'import {name}' for name in names)
+    done = subprocess.run([sys.executable, '-c', ask], text=True, capture_output=True,
+                          timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert importlib.util.find_spec(names[0]) is not None
