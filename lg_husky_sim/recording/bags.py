@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
-from lg_husky_sim.errors import LgHuskyError, MissingExtraError, RecordingError
+from lg_husky_sim.errors import LgHuskyError, RecordingError
+from lg_husky_sim.extras import require
 from lg_husky_sim.recording.topics import Topic
 
 if TYPE_CHECKING:
@@ -76,12 +77,10 @@ def open_bag(path: Path) -> Iterator[Bag]:
     MissingExtraError
         If `rosbags` is not installed.
     """
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import get_typestore, Stores
-    except ImportError as error:
-        raise MissingExtraError(
-            'reading recordings needs the package rosbags: pip install rosbags') from error
+    require('rosbags', 'read recordings')
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import get_typestore, Stores
+
     files = _files(path)
     try:
         reader = AnyReader(files, default_typestore=get_typestore(Stores.ROS2_JAZZY))

@@ -11,7 +11,8 @@ from pathlib import Path
 import tempfile
 from typing import TYPE_CHECKING
 
-from lg_husky_sim.errors import MissingExtraError, RecordingError
+from lg_husky_sim.errors import RecordingError
+from lg_husky_sim.extras import require
 from lg_husky_sim.recording.messages import Messages
 from lg_husky_sim.recording.recording import check_stream
 from lg_husky_sim.signals import FloatArray, TimeSeries
@@ -75,6 +76,7 @@ def write_recording(
     for name, series in streams.items():
         check_stream(name, series)
     check_target(target, overwrite=overwrite)
+    require('rosbags', 'write recordings')
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=target.parent) as scratch:
         made = Path(scratch) / target.name  # files inside a bag carry the bag's name
@@ -107,12 +109,9 @@ def _write(
     path: Path, streams: Mapping[str, TimeSeries], storage: str, start_ns: int,
     frames: tuple[str, str],
 ) -> None:
-    try:
-        from rosbags.rosbag2 import StoragePlugin, Writer
-        from rosbags.typesys import get_typestore, Stores
-    except ImportError as error:
-        raise MissingExtraError(
-            'writing recordings needs the package rosbags: pip install rosbags') from error
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import get_typestore, Stores
+
     store = get_typestore(Stores.ROS2_JAZZY)
     plugin = StoragePlugin.MCAP if storage == 'mcap' else StoragePlugin.SQLITE3
     with Writer(path, version=9, storage_plugin=plugin) as writer:
