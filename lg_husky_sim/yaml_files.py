@@ -1,0 +1,138 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""YAML as people write it: one error line with its place, no duplicate keys, 1e-3 is a number."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+import os
+from pathlib import Path
+import re
+from typing import Any
+
+import yaml
+
+from lg_husky_sim.errors import LgHuskyError
+
+LARGEST = 4_000_000
+"""Largest file that is read [bytes]."""
+
+MOST_ALIASES = 100
+"""A file with more references to anchors than this is refused: they can nest without end."""
+
+DEEPEST = 50
+"""Deepest nesting that is read; libyaml itself does not survive some ten thousand."""
+
+_Base: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+
+
+class _Loader(_Base):  # type: ignore[misc]
+    """The safe loader, without its two traps: duplicate keys, and 1e-3 read as a text."""
+
+
+def _unique_mapping(loader: Any, node: yaml.MappingNode) -> dict[Hashable, Any]:
+    seen: set[str] = set()
+    for key, _ in node.value:
+        if isinstance(key, yaml.ScalarNode):
+            if key.value in seen and key.value != '<<':
+                raise yaml.constructor.ConstructorError(
+                    None, None, f'{key.value} is given twice', key.start_mark)
+            seen.add(key.value)
+    loader.flatten_mapping(node)
+    return yaml.constructor.BaseConstructor.construct_mapping(loader, node, deep=True)
+
+
+_Loader.add_constructor('tag:yaml.org,2002:map', _unique_mapping)
+# YAML 1.2's floats: PyYAML wants a dot and a sign in the exponent, as no engineer writes.
+_Loader.add_implicit_resolver(
+    'tag:yaml.org,2002:float', re.compile(r'^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
+    list('-+.0123456789'))
+
+
+def _refuse_bombs(text: str) -> None:
+    depth = aliases = 0
+    for event in yaml.parse(text, _Base):
+        if isinstance(event, yaml.events.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.events.CollectionEndEvent):
+            depth -= 1
+        elif isinstance(event, yaml.events.AliasEvent):
+            aliases += 1
+        if depth > DEEPEST:
+            raise yaml.YAMLError(f'nested deeper than {DEEPEST} levels')
+        if aliases > MOST_ALIASES:
+            raise yaml.YAMLError(f'more than {MOST_ALIASES} aliases')
+
+
+def _reason(error: Exception) -> str:
+    mark = getattr(error, 'problem_mark', None)
+    if mark is None:
+        return ' '.join(str(error).split())[:200]
+    problem = ' '.join(str(getattr(error, 'problem', error)).split())
+    return f'{problem} in line {mark.line + 1}, column {mark.column + 1}'
+
+
+def parse_yaml(text: str) -> object:
+    """
+    Parse YAML text.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    object
+        Plain values as ``yaml.safe_load`` gives them.
+
+    Raises
+    ------
+    ValueError
+        It is no YAML, gives a key twice or nests without end; one line with the place.
+
+    """
+    try:
+        _refuse_bombs(text)
+        return yaml.load(text, _Loader)  # noqa: S506 (a subclass of the safe loader)
+    except (yaml.YAMLError, ValueError, TypeError, AttributeError, KeyError) as error:
+        raise ValueError(f'not YAML: {_reason(error)}') from error
+
+
+def read_yaml(path: str | os.PathLike[str], error: type[LgHuskyError]) -> dict[str, Any]:
+    """
+    Read a YAML file whose top is a mapping of names.
+
+    Parameters
+    ----------
+    path : path-like
+    error : type of LgHuskyError
+        What to raise when it cannot be read.
+
+    Returns
+    -------
+    dict
+        Plain values as ``yaml.safe_load`` gives them.
+
+    Raises
+    ------
+    LgHuskyError
+        Of the given type: no such file, too large, not text, not YAML, a key twice, or no
+        mapping; the message does not repeat the path.
+
+    """
+    place = Path(path)
+    try:
+        if place.stat().st_size > LARGEST:
+            raise error(f'larger than {LARGEST} bytes')
+        text = place.read_text(encoding='utf-8')
+    except UnicodeDecodeError as cause:
+        raise error('not a text file') from cause
+    except OSError as cause:
+        raise error(cause.strerror or str(cause)) from cause
+    try:
+        data = parse_yaml(text)
+    except ValueError as cause:
+        raise error(str(cause)) from cause
+    if not isinstance(data, dict) or not all(isinstance(key, str) for key in data):
+        raise error('the file is not a mapping of names')
+    return data
