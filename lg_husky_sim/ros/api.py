@@ -1,0 +1,161 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The names that a node needs: rclpy's where it is installed, the embedded subset's elsewhere.
+
+The choice is made by whether rclpy can be *found*, not by whether it can be imported: a broken
+ROS installation must show its error and not be hidden by a fallback.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import importlib
+from importlib.util import find_spec
+import os
+from typing import Any, TYPE_CHECKING
+
+from lg_husky_sim.errors import MissingExtraError
+
+HAVE_RCLPY = find_spec('rclpy') is not None
+
+if TYPE_CHECKING or not HAVE_RCLPY:
+    if find_spec('cyclonedds') is None:
+        raise MissingExtraError(
+            "neither rclpy nor cyclonedds is installed: source a ROS 2 setup file, or "
+            "pip install 'lg_husky_sim[dds,bags]'")
+    from lg_husky_sim.ros.embedded.context import (
+        ExternalShutdownException,
+        init,
+        ok,
+        shutdown,
+        try_shutdown,
+    )
+    from lg_husky_sim.ros.embedded.environment import read_discovery
+    from lg_husky_sim.ros.embedded.messages import message_class
+    from lg_husky_sim.ros.embedded.node import Node, services_work
+    from lg_husky_sim.ros.embedded.parameters import Parameter, ParameterType
+    from lg_husky_sim.ros.embedded.qos import (
+        DurabilityPolicy,
+        HistoryPolicy,
+        qos_profile_sensor_data,
+        QoSProfile,
+        ReliabilityPolicy,
+    )
+    from lg_husky_sim.ros.embedded.spin import SingleThreadedExecutor, spin, spin_once
+    from lg_husky_sim.ros.embedded.time import Duration, Time
+
+    #: Raised where the command line is wrong.
+    ArgumentErrors: tuple[type[Exception], ...] = ()
+else:
+    from rclpy import init, ok, shutdown, spin, spin_once, try_shutdown
+    from rclpy.duration import Duration
+    from rclpy.exceptions import (
+        InvalidNamespaceException,
+        InvalidNodeNameException,
+        InvalidTopicNameException,
+    )
+    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.node import Node
+    from rclpy.parameter import Parameter
+    from rclpy.qos import (
+        DurabilityPolicy,
+        HistoryPolicy,
+        qos_profile_sensor_data,
+        QoSProfile,
+        ReliabilityPolicy,
+    )
+    from rclpy.time import Time
+    ParameterType = Parameter.Type
+    ArgumentErrors = (
+        InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException)
+
+    def services_work() -> bool:
+        """Return True: with rclpy every middleware carries services."""
+        return True
+
+
+def message_type(name: str) -> Any:
+    """
+    Return a message class by its full name, or None if its package is not installed.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``nav_msgs/msg/Odometry``.
+    """
+    package, _, kind = name.split('/')
+    if not HAVE_RCLPY:
+        return message_class(name)
+    if find_spec(package) is None:
+        return None
+    return getattr(importlib.import_module(f'{package}.msg'), kind)
+
+
+def service_type(name: str) -> Any:
+    """
+    Return what ``create_service`` takes for a service type, or None if it cannot be offered.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``std_srvs/srv/Trigger``.
+    """
+    package, _, kind = name.split('/')
+    if not HAVE_RCLPY:
+        from lg_husky_sim.ros.embedded.definitions import SERVICES
+        return name if name in SERVICES and services_work() else None
+    if find_spec(package) is None:
+        return None
+    return getattr(importlib.import_module(f'{package}.srv'), kind)
+
+
+def parameter_overrides(node: Node) -> dict[str, Parameter]:
+    """Return the parameters that command line and files give to a node, declared or not."""
+    if not HAVE_RCLPY:
+        return node.parameter_store.overrides
+    overrides: dict[str, Parameter] = node._parameter_overrides  # type: ignore[attr-defined]
+    return overrides
+
+
+def describe_backend(environment: Mapping[str, str] = os.environ) -> str:
+    """Return backend, domain and discovery range in a line, for the first log message."""
+    if HAVE_RCLPY:
+        from rclpy.utilities import get_rmw_implementation_identifier
+        name = f'rclpy over {get_rmw_implementation_identifier()}'
+        domain = environment.get('ROS_DOMAIN_ID', '') or '0'
+        span = environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '') or 'SUBNET'
+    else:
+        name = 'embedded DDS (Cyclone)'
+        discovery = read_discovery(environment)
+        domain, span = str(discovery.domain), discovery.range
+    return f'backend {name}, domain {domain}, discovery range {span}'
+
+
+__all__ = [
+    'HAVE_RCLPY',
+    'ArgumentErrors',
+    'DurabilityPolicy',
+    'Duration',
+    'ExternalShutdownException',
+    'HistoryPolicy',
+    'Node',
+    'Parameter',
+    'ParameterType',
+    'QoSProfile',
+    'ReliabilityPolicy',
+    'SingleThreadedExecutor',
+    'Time',
+    'describe_backend',
+    'init',
+    'message_type',
+    'ok',
+    'parameter_overrides',
+    'qos_profile_sensor_data',
+    'service_type',
+    'services_work',
+    'shutdown',
+    'spin',
+    'spin_once',
+    'try_shutdown',
+]
