@@ -25,9 +25,10 @@ EXTRAS = {
     ],
     'engine': ['mujoco>=3.1'],
     'scale': ['dask[distributed]>=2024.1'],
+    'search': ['deap>=1.4'],
     'report': ['jinja2>=3.1'],
 }
-EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report')
+EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report', 'search')
                  for need in EXTRAS[extra]]
 EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale']]
 EXTRAS['test'] = ['hypothesis>=6.100', 'pytest>=8', 'pytest-xdist>=3.5']

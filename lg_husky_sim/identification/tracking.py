@@ -1,0 +1,211 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's objective, eq. (23): the sum of absolute x and y errors along a drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lg_husky_sim.errors import FitError, LgHuskyError
+from lg_husky_sim.husky.model import HuskyModel
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.identification.halves import can_split, HalvesMaker
+from lg_husky_sim.identification.lanes import operators, tracking_cost
+from lg_husky_sim.recording import Segment
+from lg_husky_sim.signals import BodyTwist, FloatArray, Pose
+from lg_husky_sim.simulation.kernel import COLUMNS
+from lg_husky_sim.simulation.simulator import hold, Simulator
+import numpy as np
+
+#: Step of the simulation [s], as in the paper's 50 Hz data.
+PERIOD = 0.02
+#: Positions averaged for the start of a drive that begins at rest [s].
+REST = 0.5
+_X, _Y = COLUMNS.index('x'), COLUMNS.index('y')
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """
+    The measured positions of one drive, and what is needed to simulate it.
+
+    Parameters
+    ----------
+    name : str
+        Recording and segment.
+    start : float
+        Time of the first measured position [s].
+    commands : numpy.ndarray, shape (n_steps, 2)
+        Forward speed [m/s] and yaw rate [rad/s] over each step of :data:`PERIOD`.
+    pose : Pose
+        At the start.
+    twist : BodyTwist
+        At the start.
+    wheel_rates : tuple of float
+        Left and right at the start [rad/s].
+    steps : numpy.ndarray of int64, shape (n_samples,)
+        Step in which each measured position lies.
+    shares : numpy.ndarray, shape (n_samples,)
+        Where within the step.
+    targets : numpy.ndarray, shape (n_samples, 2)
+        Measured x and y [m].
+    """
+
+    name: str
+    start: float
+    commands: FloatArray
+    pose: Pose
+    twist: BodyTwist
+    wheel_rates: tuple[float, float]
+    steps: np.typing.NDArray[np.int64]
+    shares: FloatArray
+    targets: FloatArray
+
+    @property
+    def times(self) -> FloatArray:
+        """Times of the measured positions [s]."""
+        at: FloatArray = self.start + (self.steps + self.shares) * PERIOD
+        return at
+
+    def simulate(self, plant: Plant) -> FloatArray:
+        """
+        Return the plant's x and y at the measured times, shape (n_samples, 2) [m].
+
+        Parameters
+        ----------
+        plant : Plant
+        """
+        simulator = Simulator(plant, PERIOD, fine_pose=False)
+        state = simulator.initial(self.pose, self.twist, self.start, self.wheel_rates)
+        _, out = simulator.run(state, self.commands)
+        grid = np.vstack([state.row, out])[:, [_X, _Y]]
+        before, after = grid[self.steps], grid[self.steps + 1]
+        there: FloatArray = before + self.shares[:, None] * (after - before)
+        return there
+
+
+def track_of(segment: Segment) -> Track | None:
+    """
+    Prepare a segment.
+
+    Parameters
+    ----------
+    segment : Segment
+
+    Returns
+    -------
+    Track or None
+        None where there is no pose or no command.
+    """
+    pose, commands = segment.streams.get('pose'), segment.streams.get('command')
+    if pose is None or commands is None or len(pose) < 3 or len(commands) == 0:
+        return None
+    start = float(pose.times[0])
+    wheels = segment.streams.get('wheels')
+    early = pose.slice(start, start + REST)
+    moved = np.hypot(np.ptp(early.column('x')), np.ptp(early.column('y')))
+    active = commands.slice(-np.inf, start + REST).values
+    rest = not np.any(active) and moved < 0.1
+    if rest:
+        # At rest the mean of the first positions, of which each is noisy.
+        first = Pose(*(float(np.mean(early.column(n))) for n in ('x', 'y', 'heading')))
+        twist, rates = BodyTwist(), (0.0, 0.0)
+    else:
+        first = Pose(*(float(v) for v in pose.values[0]))
+        span = max(float(early.times[-1] - start), 1e-3)
+        way = early.values[-1] - early.values[0]
+        along = way[0] * np.cos(first.heading) + way[1] * np.sin(first.heading)
+        twist = BodyTwist(float(along) / span, float(way[2]) / span)
+        near = None if wheels is None else wheels.slice(start, start + REST)
+        rates = (0.0, 0.0) if near is None or not len(near) else (
+            float(np.median(near.column('left'))), float(np.median(near.column('right'))))
+    place = (pose.times - start) / PERIOD
+    count = max(1, int(np.ceil(place[-1] - 1e-9)))
+    steps = np.clip(np.ceil(place - 1e-9).astype(np.int64) - 1, 0, count - 1)
+    return Track(f'{segment.recording}[{segment.index}]', start,
+                 hold(commands, start, PERIOD, count), first, twist, rates, steps,
+                 place - steps, np.ascontiguousarray(pose.values[:, :2]))
+
+
+class TrackingObjective:
+    """
+    Eq. (23) as a function of many candidates.
+
+    Parameters
+    ----------
+    model : HuskyModel
+    parameters : Parameters
+        Values of those that are not free.
+    free : tuple of str
+    segments : sequence of Segment
+        Those without pose are left out.
+
+    Raises
+    ------
+    FitError
+        If no segment has a pose.
+    """
+
+    def __init__(self, model: HuskyModel, parameters: Parameters, free: tuple[str, ...],
+                 segments: Sequence[Segment]) -> None:
+        self.tracks = tuple(t for t in map(track_of, segments) if t is not None)
+        if not self.tracks:
+            raise FitError('the objective of eq. (23) needs a pose and a command; no segment '
+                           'has both')
+        self.model, self.parameters, self.free = model, parameters, free
+        self._maker = (HalvesMaker(model, parameters, free)
+                       if can_split(model, parameters) else None)
+        self._begins = [self._begin(track) for track in self.tracks]
+
+    def _begin(self, track: Track) -> FloatArray:
+        # The two halves' states at the start: (wheels, body, current) of mean and difference.
+        left, right = track.wheel_rates
+        return np.array([0.5 * (left + right), track.twist.forward, 0.0, 0.5 * (right - left),
+                         track.twist.yaw, 0.0, track.pose.x, track.pose.y, track.pose.heading])
+
+    @property
+    def batched(self) -> bool:
+        """Whether candidates run through the batch kernel."""
+        return self._maker is not None
+
+    @property
+    def steps(self) -> int:
+        """Simulation steps of one candidate."""
+        return sum(len(track.commands) for track in self.tracks)
+
+    def __call__(self, candidates: FloatArray) -> FloatArray:
+        """
+        Return the cost of each candidate.
+
+        Parameters
+        ----------
+        candidates : numpy.ndarray, shape (n_candidates, n_free)
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_candidates,)
+            [m]; infinite where a candidate cannot be simulated.
+        """
+        rows = np.atleast_2d(np.asarray(candidates, dtype=np.float64))
+        if self._maker is None:
+            return np.array([self._single(row) for row in rows])
+        halves = self._maker(rows)
+        op = operators(halves, PERIOD)
+        cost = np.zeros(len(rows))
+        for track, begin in zip(self.tracks, self._begins, strict=True):
+            cost += tracking_cost(op, halves.stage, begin, track.commands, track.steps,
+                                  track.shares, track.targets)
+        return np.where(np.isfinite(cost), cost, np.inf)
+
+    def _single(self, row: FloatArray) -> float:
+        values = dict(zip(self.free, map(float, row), strict=True))
+        try:
+            plant = self.model.at(self.parameters.replacing(values))
+            errors = [np.abs(track.simulate(plant) - track.targets).sum()
+                      for track in self.tracks]
+        except LgHuskyError:
+            return float('inf')  # outside the bounds: the worst candidate there is
+        total = float(np.sum(errors))
+        return total if np.isfinite(total) else float('inf')
