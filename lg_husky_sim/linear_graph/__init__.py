@@ -15,6 +15,7 @@ from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.normal_tree import normal_tree, NormalTree
 from lg_husky_sim.linear_graph.numeric import compile_numeric, NumericModel
 from lg_husky_sim.linear_graph.state_space import StateSpace
+from lg_husky_sim.linear_graph.symbolic import derive, SymbolicStateSpace
 
 __all__ = [
     'Branch',
@@ -26,8 +27,10 @@ __all__ = [
     'NormalTree',
     'NumericModel',
     'StateSpace',
+    'SymbolicStateSpace',
     'TwoPort',
     'compile_numeric',
     'default_form',
+    'derive',
     'normal_tree',
 ]
