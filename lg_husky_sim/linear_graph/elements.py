@@ -65,16 +65,29 @@ TWO_PORT_KINDS = (Kind.TRANSFORMER, Kind.GYRATOR)
 
 
 class Form(Enum):
-    """Which way the value of a D-type is meant."""
+    """Which way the value of a D-type or a T-type is meant."""
 
-    RESISTANCE = 'resistance'   # across = value * through
-    DAMPING = 'damping'         # through = value * across
+    RESISTANCE = 'resistance'   # D-type: across = value * through
+    DAMPING = 'damping'         # D-type: through = value * across
+    INERTANCE = 'inertance'     # T-type: across = value * d(through)/dt
+    STIFFNESS = 'stiffness'     # T-type: d(through)/dt = value * across
 
 
-def default_form(domain: Domain) -> Form:
-    """Return how a D-type of the domain is usually given: R, or B in mechanics."""
+_FORMS = {Kind.D_TYPE: (Form.RESISTANCE, Form.DAMPING),
+          Kind.T_TYPE: (Form.INERTANCE, Form.STIFFNESS)}
+
+
+def default_form(kind: Kind, domain: Domain) -> Form | None:
+    """
+    Return how an element's value is usually given in its domain.
+
+    A D-type is a damping B in mechanics and a resistance R elsewhere; a T-type is a stiffness K
+    in mechanics, an inductance L or a fluid inertance I elsewhere. Other kinds have no form.
+    """
+    if kind not in _FORMS:
+        return None
     mechanical = domain in (Domain.TRANSLATIONAL, Domain.ROTATIONAL)
-    return Form.DAMPING if mechanical else Form.RESISTANCE
+    return _FORMS[kind][mechanical]
 
 
 @dataclass(frozen=True)
@@ -155,8 +168,10 @@ class Branch:
         Expression in named parameters, SI; for a source the name of its input (default: the
         name of the branch).
     form : Form, optional
-        For a D-type: whether the value is a resistance (across = value * through) or a damping
-        (through = value * across). Default: damping in mechanics, resistance elsewhere.
+        For a D-type, whether the value is a resistance (across = value * through) or a damping
+        (through = value * across); for a T-type, whether it is an inertance
+        (across = value * d(through)/dt) or a stiffness (d(through)/dt = value * across).
+        Default: damping and stiffness in mechanics, resistance and inertance elsewhere.
     characteristic : Characteristic, optional
         On a source: its value is a named effort. On a D-type: its through variable (damping) or
         its across variable (resistance) is that function, usually of its own other variable.
@@ -190,9 +205,11 @@ class Branch:
         if self.tail == self.head:
             raise GraphError(f'branch {self.name!r} starts and ends at node {self.tail!r}; '
                              'a branch must join two nodes')
-        if self.form is not None and self.kind is not Kind.D_TYPE:
-            raise GraphError(f'branch {self.name!r}: only a D-type has a form, '
-                             f'not a {self.kind.value}')
+        allowed = _FORMS.get(self.kind, ())
+        if self.form is not None and self.form not in allowed:
+            names = ' or '.join(form.value for form in allowed) or 'no form'
+            raise GraphError(f'branch {self.name!r}: a {self.kind.value} takes {names}, '
+                             f'not {self.form.value}')
         if self.domain is Domain.THERMAL and self.kind is Kind.T_TYPE:
             raise GraphError(f'branch {self.name!r}: the thermal domain has no T-type; '
                              'use an A-type (heat capacity) or a D-type (thermal resistance)')
@@ -225,9 +242,19 @@ class Branch:
         return self.value or self.name
 
     @property
+    def given_form(self) -> Form | None:
+        """The form, or its default; None for elements without one."""
+        return self.form or default_form(self.kind, self.domain)
+
+    @property
     def is_damping(self) -> bool:
         """Whether a D-type's value (or law) gives through from across."""
-        return (self.form or default_form(self.domain)) is Form.DAMPING
+        return self.given_form is Form.DAMPING
+
+    @property
+    def is_stiffness(self) -> bool:
+        """Whether a T-type's value is a stiffness."""
+        return self.given_form is Form.STIFFNESS
 
 
 Port = tuple[Domain, str, str]

@@ -179,15 +179,17 @@ def _law(structure: Structure, edge: int, texts: Mapping[str, str]) -> Constitut
                             f'{latex_of(primary)} = {_symbol(owner.input_name)}')
     if isinstance(owner, Branch) and owner.kind in (Kind.A_TYPE, Kind.T_TYPE):
         value, value_latex = texts[owner.name], _value_latex(texts[owner.name])
-        if edge in structure.states:
-            return Constitutive(
-                owner.name, f'd {primary}/dt = {_over(secondary, value)}',
-                rf'\frac{{d}}{{dt}} {latex_of(primary)} = \frac{{1}}{{{value_latex}}} '
-                rf'{latex_of(secondary)}')
+        rate = rf'\frac{{d}}{{dt}} {latex_of(secondary)}'
+        left, left_latex, right, right_latex = (
+            (f'd {primary}/dt', rf'\frac{{d}}{{dt}} {latex_of(primary)}',
+             secondary, latex_of(secondary)) if edge in structure.states else
+            (primary, latex_of(primary), f'd {secondary}/dt', rate))
+        divided = (edge in structure.states) != (edge in structure.stiff)
+        factor = rf'\frac{{1}}{{{value_latex}}}' if divided else _bracketed(value_latex)
         return Constitutive(
-            owner.name, f'{primary} = {_times(value, f"d {secondary}/dt")}',
-            rf'{latex_of(primary)} = {_bracketed(value_latex)} \frac{{d}}{{dt}} '
-            rf'{latex_of(secondary)}')
+            owner.name,
+            f'{left} = {_over(right, value) if divided else _times(value, right)}',
+            f'{left_latex} = {factor} {right_latex}')
     term = next(term for term in structure.terms if term.edge == edge)
     value = texts[owner.name]
     sign = '-' if term.sign < 0 else ''

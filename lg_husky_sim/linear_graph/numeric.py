@@ -99,7 +99,6 @@ class NumericModel:
                                 for value in values])
         terms, algebraic = structure.terms, structure.algebraic
         self._pick = np.array([term.value for term in terms], dtype=np.intp)
-        self._power = np.array([-1.0 if term.inverse else 1.0 for term in terms])
         self._inverse = np.array([term.inverse for term in terms], dtype=bool)
         known, self._slices = self._known_columns()
         term_rows = structure.rows([term.source for term in terms])
@@ -115,8 +114,10 @@ class NumericModel:
         rows = structure.rows(wanted)
         self._row_known = rows @ known
         self._row_algebraic = np.ascontiguousarray(rows[:, list(algebraic)])
-        self._storage = np.array([structure.storage_values[edge] for edge in
-                                  (*structure.states, *structure.excess)], dtype=np.intp)
+        storages = (*structure.states, *structure.excess)
+        self._storage = np.array([structure.storage_values[edge] for edge in storages],
+                                 dtype=np.intp)
+        self._stiff = np.array([edge in structure.stiff for edge in storages], dtype=bool)
 
     def _known_columns(self) -> tuple[FloatArray, tuple[int, int, int]]:
         """Return c over (x, u, f, s) without the algebraic part, and where each begins."""
@@ -172,7 +173,9 @@ class NumericModel:
             solved = np.linalg.solve(self._identity - coupling, drive)
         except np.linalg.LinAlgError as error:
             raise self._singular() from error
-        return self._row_known + self._row_algebraic @ solved, raw[self._storage]
+        storage = raw[self._storage]
+        np.reciprocal(storage, out=storage, where=self._stiff)
+        return self._row_known + self._row_algebraic @ solved, storage
 
     def _state_space(self, rows: FloatArray, storage: FloatArray) -> StateSpace:
         structure = self.structure

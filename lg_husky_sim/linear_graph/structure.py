@@ -102,6 +102,8 @@ class Structure:
         All expressions.
     storage_values : mapping of int to int
         Edge of a storage to the position of its value.
+    stiff : frozenset of int
+        Edges of T-types whose value is a stiffness, the inverse of an inertance.
     outputs, arguments : tuple of Variable
         What is asked for, and the arguments of the efforts, one after the other.
     """
@@ -119,6 +121,7 @@ class Structure:
     terms: tuple[Term, ...]
     values: tuple[Value, ...]
     storage_values: Mapping[int, int]
+    stiff: frozenset[int]
     outputs: tuple[Variable, ...]
     arguments: tuple[Variable, ...]
 
@@ -199,7 +202,9 @@ def analyse(graph: LinearGraph, outputs: Sequence[str] = ()) -> Structure:
         tuple(edge for edge in storages if edge in dependent),
         tuple(builder.inputs), tuple(builder.input_edges), tuple(builder.efforts),
         tuple(dict.fromkeys(builder.algebraic)), tuple(builder.terms), tuple(builder.values),
-        builder.storage_values, tuple(wanted), tuple(builder.arguments))
+        builder.storage_values,
+        frozenset(at for at, branch in enumerate(graph.branches) if branch.is_stiffness),
+        tuple(wanted), tuple(builder.arguments))
 
 
 def _secondary(graph: LinearGraph, in_tree: tuple[bool, ...]) -> FloatArray:

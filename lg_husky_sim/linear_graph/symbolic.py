@@ -194,7 +194,8 @@ class _Derivation:
         return known
 
     def _storage(self, edge: int) -> Any:
-        return self.values[self.structure.storage_values[edge]]
+        value = self.values[self.structure.storage_values[edge]]
+        return 1 / value if edge in self.structure.stiff else value
 
     def _excess_rate(self, at: int, states: list[Row]) -> Row:
         """Return the variable of an excess storage: value * d(dependent)/dt."""
