@@ -1,0 +1,196 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How well a fit knows its parameters: covariance, intervals, and what the data cannot determine.
+
+The covariance is a sandwich: the curvature of the whitened residuals around their scatter, summed
+over blocks of time, so that correlation that the whitening left within a block is counted. A
+block's sum weighs by what it really contributed, not by what white noise would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import itertools
+
+from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+from scipy import stats
+
+#: Length of a block [s].
+BLOCK = 2.0
+#: Probability of an interval.
+LEVEL = 0.95
+#: Correlation from which two parameters are said to be known only together.
+TOGETHER = 0.9
+#: Relative half width of an interval from which a parameter counts as poorly determined.
+WIDE = 0.3
+#: Least gain in relative accuracy of a ratio or product over its parts to be worth saying.
+GAIN = 3.0
+_MECHANICAL = {'wheel_damping', 'yaw_damping', 'mass', 'yaw_inertia', 'wheel_inertia'}
+_MOTOR = {'torque_constant', 'motor_resistance', 'motor_inductance', 'gear_ratio'}
+_KINEMATIC = {'wheel_radius', 'track', 'turn_ratio'}
+_SUPPLY = {'command_gain', 'supply_voltage'}
+
+
+@dataclass(frozen=True, eq=False)
+class Confidence:
+    """
+    Uncertainty of a fit in its varied quantities (logarithms of most parameters).
+
+    Parameters
+    ----------
+    unknowns : tuple of Unknown
+    covariance, correlation : numpy.ndarray, shape (n_unknowns, n_unknowns)
+        Of the varied quantities.
+    condition : float
+        Of the correlation matrix of the curvature: large where combinations are undetermined.
+    blocks : int
+        Blocks of time that the scatter was summed over.
+    low, high : numpy.ndarray, shape (n_unknowns,)
+        95 % intervals of the values.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    covariance: FloatArray
+    correlation: FloatArray
+    condition: float
+    blocks: int
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Standard deviations of the varied quantities."""
+        root: FloatArray = np.sqrt(np.diag(self.covariance))
+        return root
+
+
+def _block_sums(problem: Problem, slope: FloatArray, white: FloatArray) -> FloatArray:
+    # Score of each block of time, all channels together, shape (n_blocks, n_unknowns).
+    observations = problem.observations
+    number = np.zeros(white.size, dtype=np.int64)
+    for one in observations.slices:
+        part = slice(one.first, one.last)
+        start = observations.pieces[one.piece].start
+        number[part] = one.piece * 1_000_000 + (
+            (observations.times[part] - start) / BLOCK).astype(np.int64)
+    _, place = np.unique(number, return_inverse=True)
+    scores = np.zeros((int(place.max(initial=0)) + 1, slope.shape[1]))
+    np.add.at(scores, place, slope * white[:, None])
+    return scores
+
+
+def confidence(problem: Problem, solution: Solution) -> Confidence:
+    """
+    Return the uncertainty of a solution.
+
+    Parameters
+    ----------
+    problem : Problem
+        With the metric of the last pass.
+    solution : Solution
+
+    Returns
+    -------
+    Confidence
+        Variances are the larger of the sandwich's and of the curvature's, so that few blocks do
+        not feign accuracy; intervals by Student's t over the blocks.
+    """
+    observations, metric = problem.observations, problem.metric
+    white = metric.whiten(observations, observations.measured - solution.predicted)
+    slope = metric.whiten(observations, solution.jacobian)
+    count = slope.shape[1]
+    priors = np.array([0.0 if np.isinf(u.deviation) else u.deviation ** -2
+                       for u in solution.unknowns])
+    curvature = slope.T @ slope + np.diag(priors)
+    size = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
+    shape = curvature / np.outer(size, size)
+    eigenvalues = np.linalg.eigvalsh(shape) if count else np.ones(1)
+    condition = float(eigenvalues[-1] / max(eigenvalues[0], 1e-16))
+    bread = np.linalg.pinv(shape, rcond=1e-14, hermitian=True) / np.outer(size, size)
+    scores = _block_sums(problem, slope, white)
+    blocks = scores.shape[0]
+    meat = scores.T @ scores * blocks / max(blocks - 1, 1)
+    level = max(float(np.mean(white ** 2)), 0.25)
+    plain = bread * level
+    sandwich = bread @ meat @ bread
+    variances = np.maximum(np.diag(sandwich), np.diag(plain))
+    lift = np.sqrt(variances / np.maximum(np.diag(plain), 1e-300))
+    covariance = plain * np.outer(lift, lift)
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    reach = float(stats.t.ppf(0.5 + 0.5 * LEVEL, max(blocks - count, 1))) * deviations
+    varied = [u.varied(solution.values[u.name]) for u in solution.unknowns]
+    low = [u.value(v - r) for u, v, r in zip(solution.unknowns, varied, reach, strict=True)]
+    high = [u.value(v + r) for u, v, r in zip(solution.unknowns, varied, reach, strict=True)]
+    return Confidence(solution.unknowns, covariance, covariance / np.outer(
+        deviations, deviations), condition, blocks, np.array(low), np.array(high))
+
+
+def separators(names: Sequence[str]) -> str:
+    """Return which sensor or manoeuvre would separate parameters, in words."""
+    group = set(names)
+    if group <= _MECHANICAL:
+        return 'weighing the robot or a motor current sensor would separate them'
+    if group & _MOTOR and group <= _MOTOR | _MECHANICAL | _SUPPLY:
+        return 'a motor current sensor would separate them'
+    if group & _SUPPLY and group <= _SUPPLY | _MECHANICAL:
+        return 'a voltage or current sensor would separate them'
+    if group & _KINEMATIC:
+        return 'measuring the wheel radius and the track would separate them'
+    return 'a drive with other speeds, stops and turns on the spot would separate them'
+
+
+def _relative(name: str, unknown: Unknown, deviation: float, value: float) -> float:
+    return deviation if unknown.logarithmic else deviation / max(abs(value), 1e-12)
+
+
+def undetermined(result: Confidence, values: FloatArray) -> tuple[str, ...]:
+    """
+    Say in words which parameters the data leave open, alone or together.
+
+    Parameters
+    ----------
+    result : Confidence
+    values : numpy.ndarray, shape (n_unknowns,)
+        Estimates.
+
+    Returns
+    -------
+    tuple of str
+        One sentence each; empty where every parameter is known by itself.
+    """
+    said: list[str] = []
+    deviations = result.deviations
+    reach = stats.norm.ppf(0.5 + 0.5 * LEVEL)
+    names = [u.name for u in result.unknowns]
+    relative = [_relative(n, u, float(d), float(v)) for n, u, d, v in zip(
+        names, result.unknowns, deviations, values, strict=True)]
+    for i, j in itertools.combinations(range(len(names)), 2):
+        both = result.unknowns[i].logarithmic and result.unknowns[j].logarithmic
+        correlation = float(result.correlation[i, j])
+        if not both or abs(correlation) < TOGETHER:
+            continue
+        sign = 1.0 if correlation > 0.0 else -1.0
+        variance = (result.covariance[i, i] + result.covariance[j, j]
+                    - 2.0 * sign * result.covariance[i, j])
+        joint = float(np.sqrt(max(variance, 0.0)))
+        if joint * GAIN > min(relative[i], relative[j]):
+            continue
+        # The less certain one over the other reads as B_H/B.
+        first, second = names[j], names[i]
+        form = f'{first}/{second}' if sign > 0.0 else f'{first}·{second}'
+        amount = (values[j] / values[i]) if sign > 0.0 else values[j] * values[i]
+        said.append(
+            f'only {form} = {amount:.4g} is well determined (±{100 * reach * joint:.2g} %), '
+            f'{names[i]} and {names[j]} alone only to ±{100 * reach * relative[i]:.2g} % and '
+            f'±{100 * reach * relative[j]:.2g} % (correlation {correlation:+.3f}); '
+            f'{separators((names[i], names[j]))}')
+    covered = ' '.join(said)
+    for name, spread in zip(names, relative, strict=True):
+        if reach * spread > WIDE and name not in covered:
+            said.append(f'{name} is hardly determined by these data '
+                        f'(±{100 * reach * spread:.2g} %)')
+    return tuple(said)

@@ -1,0 +1,249 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Estimate parameters from recorded segments, by any method behind one signature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+import time
+
+from lg_husky_sim.errors import FitError
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.identification.confidence import Confidence, confidence, undetermined
+from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
+from lg_husky_sim.identification.multistart import best_solution, Ends, refine
+from lg_husky_sim.identification.problem import Observations, observations, UNITS
+from lg_husky_sim.identification.result import (
+    ChannelFit,
+    Estimated,
+    FitResult,
+    Method,
+    Start,
+)
+from lg_husky_sim.identification.search import (
+    differential_evolution,
+    genetic,
+    Objective,
+    SearchResult,
+)
+from lg_husky_sim.identification.tracking import TrackingObjective
+from lg_husky_sim.identification.unknowns import (
+    free_names,
+    NUISANCES,
+    search_bounds,
+    unknowns_of,
+)
+from lg_husky_sim.recording import Segment
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Starts of the multi-start least squares, the given model's values being the first.
+STARTS = 6
+#: Difference in cost within which two ends fit the data equally well [nats].
+EQUAL = 2.0
+#: Distance of two ends, in standard deviations, from which they disagree.
+APART = 3.0
+
+
+def estimate(model: ModelFile, segments: Sequence[Segment], *,
+             method: Method = Method.LEAST_SQUARES, free: Sequence[str] = (),
+             nuisance: Sequence[str] = (), seed: int = 0, starts: int = STARTS, jobs: int = 1,
+             scheduler: str | None = None, baseline: ModelFile | None = None,
+             progress: Callable[[str], None] | None = None) -> FitResult:
+    """
+    Estimate parameters.
+
+    Parameters
+    ----------
+    model : ModelFile
+        Structure and the values to start from.
+    segments : sequence of Segment
+        Of one or more recordings; every channel is used at its own stamps.
+    method : Method
+        The paper's genetic algorithm or differential evolution on eq. (23), or multi-start
+        least squares on all outputs.
+    free : sequence of str
+        Parameters to estimate; those marked free in the model and all of its effects' if empty.
+    nuisance : sequence of str
+        Unknowns of the recordings, for least squares: latency, delay_wheels, delay_imu,
+        delay_pose [s], gyro_bias [rad/s].
+    seed : int
+        The same seed gives the same estimates to the last bit.
+    starts : int
+        Starts of the least squares.
+    jobs : int
+        Processes for the starts.
+    scheduler : str, optional
+        Address of a Dask scheduler for the starts.
+    baseline : ModelFile, optional
+        Model of the column "before"; ``model`` if not given.
+    progress : callable, optional
+        Called with a word after each unit of work.
+
+    Returns
+    -------
+    FitResult
+        A poor end is no exception: see ``converged`` and ``warnings``.
+
+    Raises
+    ------
+    FitError
+        If nothing is free, or eq. (23) is asked for without a pose.
+    RecordingError
+        If no segment can be used.
+    """
+    names = free_names(model, free)
+    began = time.perf_counter()
+    data = observations(segments)
+    tell = progress or (lambda word: None)
+    if method is Method.LEAST_SQUARES:
+        unknowns = unknowns_of(model, names, nuisance)
+        ends = best_solution(data, model, unknowns, seed, starts, jobs, scheduler, tell)
+        problem, solution, evaluations = refine(data, model, unknowns, ends.values, tell)
+        return _result(model, baseline or model, segments, method, seed, problem, solution,
+                       ends.evaluations + evaluations, began, ends=ends)
+    if nuisance:
+        raise FitError(f'nuisance {nuisance[0]!r} can only be estimated by least-squares')
+    objective = TrackingObjective(compile_model(model.structure), model.parameters, names,
+                                  segments)
+    found = _search(method, objective, *search_bounds(model.parameters, names), seed, tell)
+    fitted = replace(model, parameters=model.parameters.replacing(
+        dict(zip(names, map(float, found.values), strict=True))))
+    unknowns = unknowns_of(fitted, names, ())
+    problem, solution, evaluations = refine(data, fitted, unknowns, {}, tell, steps=0)
+    return _result(model, baseline or model, segments, method, seed, problem, solution,
+                   found.evaluations + evaluations, began, search=found)
+
+
+def _search(method: Method, objective: Objective, lower: FloatArray, upper: FloatArray,
+            seed: int, tell: Callable[[str], None]) -> SearchResult:
+    def each(generation: int, best: float) -> None:
+        tell(f'generation {generation}, {best:.4g} m')
+    run = genetic if method is Method.GENETIC else differential_evolution
+    return run(objective, lower, upper, seed, each)
+
+
+def _result(model: ModelFile, baseline: ModelFile, segments: Sequence[Segment], method: Method,
+            seed: int, problem: Problem, solution: Solution, evaluations: int, began: float,
+            ends: Ends | None = None, search: SearchResult | None = None) -> FitResult:
+    sure = confidence(problem, solution)
+    estimates = tuple(
+        _estimated(u, solution.values[u.name], float(low), float(high), model.parameters)
+        for u, low, high in zip(solution.unknowns, sure.low, sure.high, strict=True))
+    of_model = [one for one in estimates if not one.nuisance]
+    fitted = ModelFile(model.structure, model.parameters.with_entries(*(
+        replace(model.parameters.entry(one.name), value=one.value, low=one.low, high=one.high,
+                source=f'estimated from {", ".join(_recordings(segments))}')
+        for one in of_model)), f'{model.about}; estimated by {method.value}'.lstrip('; '))
+    values = np.array([one.value for one in estimates])
+    warnings = _warnings(solution, estimates, sure, ends, search, model)
+    cost = solution.cost if search is None else search.cost
+    converged = (solution.converged if search is None else search.converged)
+    starts = () if ends is None else tuple(
+        Start(dict(end.values), end.cost, end.converged) for end in ends.all)
+    history = np.zeros((0, 2)) if search is None else np.column_stack([search.best, search.mean])
+    return FitResult(
+        method, seed, fitted, _recordings(segments), estimates, sure.correlation,
+        sure.covariance, sure.condition, cost, evaluations, time.perf_counter() - began,
+        channel_fits(problem.observations, segments, baseline, fitted, solution),
+        starts, history, undetermined(sure, values), warnings, converged)
+
+
+def _recordings(segments: Sequence[Segment]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(s.recording for s in segments))
+
+
+def _estimated(unknown: Unknown, value: float, low: float, high: float,
+               parameters: Parameters) -> Estimated:
+    if unknown.extra:
+        return Estimated(unknown.name, NUISANCES[unknown.name][0], value, low, high, 0.0, True)
+    entry = parameters.entry(unknown.name)
+    return Estimated(unknown.name, entry.unit, value, low, high, entry.value)
+
+
+def channel_fits(data: Observations, segments: Sequence[Segment], before: ModelFile,
+                 after: ModelFile, solution: Solution | None = None) -> tuple[ChannelFit, ...]:
+    """
+    Compare two models with the data, channel by channel.
+
+    Parameters
+    ----------
+    data : Observations
+    segments : sequence of Segment
+        For the position, which is simulated from each segment's start without resets.
+    before, after : ModelFile
+    solution : Solution, optional
+        Holds the prediction of ``after`` with the recordings' own unknowns.
+
+    Returns
+    -------
+    tuple of ChannelFit
+        Position last, where a pose was recorded: root mean square distance [m].
+    """
+    plants = [compile_model(m.structure).at(m.parameters) for m in (before, after)]
+    errors = [data.measured - data.predict(plants[0]), data.measured - (
+        data.predict(plants[1]) if solution is None else solution.predicted)]
+    rows = []
+    for name in data.channels:
+        mask = data.channel_mask(name)
+        rms = [float(np.sqrt(np.mean(error[mask] ** 2))) for error in errors]
+        rows.append(ChannelFit(name, UNITS[name], int(mask.sum()), rms[0], rms[1]))
+    if any('pose' in s.streams for s in segments):
+        tracks = TrackingObjective(compile_model(after.structure), after.parameters, (),
+                                   segments).tracks
+        squares = [[np.sum((t.simulate(plant) - t.targets) ** 2, axis=1) for t in tracks]
+                   for plant in plants]
+        rms = [float(np.sqrt(np.mean(np.concatenate(square)))) for square in squares]
+        rows.append(ChannelFit('position', 'm', sum(len(s) for s in squares[0]), rms[0], rms[1]))
+    return tuple(rows)
+
+
+def _warnings(solution: Solution, estimates: Sequence[Estimated], sure: Confidence,
+              ends: Ends | None, search: SearchResult | None, model: ModelFile
+              ) -> tuple[str, ...]:
+    said = []
+    bounds = {u.name: (u.lower, u.upper) for u in solution.unknowns}
+    if search is not None:
+        names = [one.name for one in estimates]
+        lower, upper = search_bounds(model.parameters, tuple(names))
+        bounds.update(zip(names, zip(map(float, lower), map(float, upper), strict=True),
+                          strict=True))
+    for one in estimates:
+        low, high = bounds[one.name]
+        near = 1e-3 * (high - low) if search is not None else 1e-9 * max(abs(low), abs(high))
+        for side, bound in (('lower', low), ('upper', high)):
+            if abs(one.value - bound) <= near:
+                said.append(f'{one.name} = {one.value:.5g} {one.unit} ended on its {side} bound '
+                            f'{bound:g}')
+    if search is not None:
+        if not search.converged:
+            said.append(f'not converged: {search.message}')
+        return tuple(said)
+    if not solution.converged:
+        said.append('not converged: the last step still lowered the cost; more steps are needed')
+    if ends is not None and len(ends.all) > 1:
+        said.extend(_disagreement(ends, sure))
+    return tuple(said)
+
+
+def _disagreement(ends: Ends, sure: Confidence) -> list[str]:
+    said = []
+    best = min(end.cost for end in ends.all)
+    worse = [end for end in ends.all if end.cost > best + EQUAL]
+    equal = [end for end in ends.all if end.cost <= best + EQUAL]
+    spread = np.maximum(sure.deviations, 1e-12)
+    apart: set[str] = set()
+    for unknown, deviation in zip(sure.unknowns, spread, strict=True):
+        varied = [unknown.varied(end.values[unknown.name]) for end in equal]
+        if max(varied) - min(varied) > APART * deviation:
+            apart.add(unknown.name)
+    if apart:
+        said.append(f'starts disagree: {len(equal)} ends fit equally well but differ in '
+                    f'{", ".join(sorted(apart))}')
+    if len(worse) * 2 > len(ends.all):
+        said.append(f'{len(worse)} of {len(ends.all)} starts ended in a worse minimum: the best '
+                    'one may not be the lowest either')
+    return said

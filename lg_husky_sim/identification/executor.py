@@ -1,0 +1,90 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Run independent tasks here, on several processes, or on a Dask cluster; same results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed, ProcessPoolExecutor
+import multiprocessing
+from typing import Any, TypeVar
+
+from lg_husky_sim.errors import FitError, MissingExtraError
+
+Task = TypeVar('Task')
+Outcome = TypeVar('Outcome')
+#: Seconds to wait for a scheduler to answer.
+PATIENCE = 10.0
+
+
+def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: int = 1,
+              scheduler: str | None = None, progress: Callable[[], None] | None = None
+              ) -> list[Outcome]:
+    """
+    Apply a function to tasks.
+
+    Parameters
+    ----------
+    function : callable
+        Of one task; importable by name, and it depends on its task alone.
+    tasks : sequence
+        Picklable where ``jobs`` is above 1 or a scheduler is given.
+    jobs : int
+        Processes on this machine.
+    scheduler : str, optional
+        Address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``; takes the tasks instead.
+    progress : callable, optional
+        Called after each task.
+
+    Returns
+    -------
+    list
+        In the order of the tasks, whatever order they ended in.
+
+    Raises
+    ------
+    FitError
+        If the scheduler does not answer.
+    MissingExtraError
+        If a scheduler is given and Dask is not installed.
+    """
+    tell = progress or (lambda: None)
+    if scheduler is not None:
+        return _dask(function, tasks, scheduler, tell)
+    if jobs <= 1 or len(tasks) <= 1:
+        done = []
+        for task in tasks:
+            done.append(function(task))
+            tell()
+        return done
+    # Processes are spawned: nothing of this one's threads and state is copied.
+    with ProcessPoolExecutor(min(jobs, len(tasks)),
+                             mp_context=multiprocessing.get_context('spawn')) as pool:
+        futures = [pool.submit(function, task) for task in tasks]
+        try:
+            for future in as_completed(futures):
+                future.result()
+                tell()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+        return [future.result() for future in futures]
+
+
+def _dask(function: Callable[[Task], Outcome], tasks: Sequence[Task], scheduler: str,
+          tell: Callable[[], None]) -> list[Outcome]:
+    try:
+        from distributed import as_completed as completed, Client
+    except ImportError as error:
+        raise MissingExtraError('--scheduler needs Dask: pip install "lg_husky_sim[scale]"'
+                                ) from error
+    try:
+        client: Any = Client(scheduler, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise FitError(f'no Dask scheduler answers at {scheduler!r}') from error
+    with client:
+        futures = client.map(function, tasks, pure=False)
+        for _ in completed(futures):
+            tell()
+        results: list[Outcome] = client.gather(futures)
+        return results

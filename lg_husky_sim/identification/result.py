@@ -1,0 +1,199 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What an estimation found, as a value that prints itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import enum
+from typing import Any
+
+from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+SCHEMA = 'lg_husky_sim/fit/1'
+#: Correlations below this are not printed.
+SHOWN = 0.5
+
+
+class Method(enum.Enum):
+    """How to estimate."""
+
+    GENETIC = 'ga'
+    DIFFERENTIAL_EVOLUTION = 'de'
+    LEAST_SQUARES = 'least-squares'
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """
+    One estimated number.
+
+    Parameters
+    ----------
+    name, unit : str
+    value, low, high : float
+        Estimate and 95 % interval [unit].
+    start : float
+        Value in the model that was given [unit].
+    nuisance : bool
+        Whether it belongs to the recording (a stamp's delay, an offset), not to the model.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    start: float
+    nuisance: bool = False
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """
+    How one channel agrees before and after.
+
+    Parameters
+    ----------
+    name, unit : str
+    count : int
+        Values.
+    before, after : float
+        Root mean square of measured minus predicted [unit].
+    """
+
+    name: str
+    unit: str
+    count: int
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class Start:
+    """
+    Where one of several starts ended.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+    cost : float
+    converged : bool
+    """
+
+    values: Mapping[str, float]
+    cost: float
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """
+    What an estimation found.
+
+    Parameters
+    ----------
+    method : Method
+    seed : int
+    model : ModelFile
+        With the estimates and their intervals.
+    recordings : tuple of str
+    estimates : tuple of Estimated
+    correlation : numpy.ndarray, shape (n, n)
+        Between the estimates.
+    covariance : numpy.ndarray, shape (n, n)
+        Of the varied quantities (logarithms, where a parameter is positive).
+    condition : float
+    cost : float
+        Half the whitened sum of squares [nats], or eq. (23) [m].
+    evaluations : int
+        Simulations of all recordings.
+    seconds : float
+        Wall time; the only number here that differs between two runs.
+    channels : tuple of ChannelFit
+    starts : tuple of Start
+        For least squares.
+    history : numpy.ndarray, shape (n_generations + 1, 2)
+        Best and mean cost of each generation, for the searches by populations.
+    undetermined, warnings : tuple of str
+        Sentences.
+    converged : bool
+    """
+
+    method: Method
+    seed: int
+    model: ModelFile
+    recordings: tuple[str, ...]
+    estimates: tuple[Estimated, ...]
+    correlation: FloatArray
+    covariance: FloatArray
+    condition: float
+    cost: float
+    evaluations: int
+    seconds: float
+    channels: tuple[ChannelFit, ...]
+    starts: tuple[Start, ...] = ()
+    history: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    undetermined: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    converged: bool = True
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Estimates by name."""
+        return {one.name: one.value for one in self.estimates}
+
+    def __str__(self) -> str:
+        """Return the report as text."""
+        lines = [f'Fit of {len(self.recordings)} recording(s): {", ".join(self.recordings)}',
+                 f'method {self.method.value}, seed {self.seed}, {self.evaluations} simulations, '
+                 f'{self.seconds:.2f} s, cost {self.cost:.6g}, '
+                 f'{"converged" if self.converged else "NOT CONVERGED"}', '']
+        width = max([9, *(len(one.name) for one in self.estimates)])
+        lines.append(f'{"parameter":<{width}}  {"value":>11}  {"95 % interval":>25}  '
+                     f'{"before":>11}  unit')
+        for one in self.estimates:
+            interval = f'{one.low:.5g} to {one.high:.5g}'
+            note = '  (of the recording)' if one.nuisance else ''
+            lines.append(f'{one.name:<{width}}  {one.value:>11.5g}  {interval:>25}  '
+                         f'{one.start:>11.5g}  {one.unit}{note}')
+        lines += ['', f'{"channel":<{width}}  {"values":>8}  {"RMS before":>11}  {"after":>11}  '
+                      'unit']
+        lines += [f'{c.name:<{width}}  {c.count:>8}  {c.before:>11.4g}  {c.after:>11.4g}  {c.unit}'
+                  for c in self.channels]
+        pairs = [(abs(self.correlation[i, j]), i, j) for i in range(len(self.estimates))
+                 for j in range(i) if abs(self.correlation[i, j]) >= SHOWN]
+        if pairs:
+            lines += ['', f'correlations of {SHOWN} and more '
+                          f'(condition number {self.condition:.3g}):']
+            lines += [f'  {self.estimates[j].name}, {self.estimates[i].name}: '
+                      f'{self.correlation[i, j]:+.3f}' for _, i, j in sorted(pairs, reverse=True)]
+        if self.undetermined:
+            lines += ['', 'what these data cannot determine:',
+                      *(f'  {text}' for text in self.undetermined)]
+        if self.warnings:
+            lines += ['', 'warnings:', *(f'  {text}' for text in self.warnings)]
+        return '\n'.join(lines)
+
+    def data(self) -> dict[str, Any]:
+        """Return the report as plain data for JSON."""
+        return {
+            'schema': SCHEMA, 'method': self.method.value, 'seed': self.seed,
+            'recordings': list(self.recordings), 'converged': self.converged,
+            'cost': self.cost, 'evaluations': self.evaluations, 'seconds': self.seconds,
+            'condition': self.condition,
+            'parameters': [{
+                'name': one.name, 'value': one.value, 'unit': one.unit, 'low': one.low,
+                'high': one.high, 'before': one.start, 'nuisance': one.nuisance}
+                for one in self.estimates],
+            'correlation': self.correlation.tolist(), 'covariance': self.covariance.tolist(),
+            'channels': [{'name': c.name, 'unit': c.unit, 'count': c.count,
+                          'rms_before': c.before, 'rms_after': c.after} for c in self.channels],
+            'starts': [{'values': dict(s.values), 'cost': s.cost, 'converged': s.converged}
+                       for s in self.starts],
+            'history': self.history.tolist(),
+            'undetermined': list(self.undetermined), 'warnings': list(self.warnings),
+        }

@@ -1,0 +1,176 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which numbers an estimation varies, and from where it starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from lg_husky_sim.errors import FitError
+from lg_husky_sim.husky.effects import EffectParameter
+from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.identification.least_squares import effect_unknown, Unknown
+from lg_husky_sim.identification.paper import paper
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Unknowns of a recording: unit, lower and upper bound, step of a difference.
+NUISANCES: dict[str, tuple[str, float, float, float]] = {
+    'latency': ('s', 0.0, 1.0, 0.01),
+    'delay_wheels': ('s', -0.5, 0.5, 0.01),
+    'delay_imu': ('s', -0.5, 0.5, 0.01),
+    'delay_pose': ('s', -0.5, 0.5, 0.01),
+    'gyro_bias': ('rad/s', -0.5, 0.5, 0.002),
+}
+#: Prior on the logarithm of a free parameter: a factor of e to this power either way. So weak
+#: that it only keeps directions that the data leave open from running away.
+WEAK = 4.0
+#: Random starts lie within this factor of the given value.
+AROUND = 6.0
+
+
+def free_names(model: ModelFile, asked: Sequence[str]) -> tuple[str, ...]:
+    """
+    Return the names to estimate.
+
+    Parameters
+    ----------
+    model : ModelFile
+    asked : sequence of str
+        As the user asked; empty for the model's own choice.
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    FitError
+        If nothing is free.
+    ParameterError
+        If a name is unknown.
+    """
+    if asked:
+        for name in asked:
+            model.parameters.entry(name)
+        return tuple(dict.fromkeys(asked))
+    names = [p.name for p in model.parameters.entries if p.free]
+    names += [p.name for effect in model.structure.effects for p in effect.parameters()
+              if not p.fixed]
+    if not names:
+        raise FitError('no parameter is free: mark one in the model file, or name some with '
+                       '--free')
+    return tuple(dict.fromkeys(names))
+
+
+def effect_parameters(model: ModelFile) -> dict[str, EffectParameter]:
+    """Return the numbers of the model's effects by name."""
+    return {p.name: p for effect in model.structure.effects for p in effect.parameters()}
+
+
+def unknowns_of(model: ModelFile, names: Sequence[str], nuisance: Sequence[str]
+                ) -> tuple[Unknown, ...]:
+    """
+    Return what a least-squares estimation varies.
+
+    Parameters
+    ----------
+    model : ModelFile
+    names : sequence of str
+        Parameters, of the robot or of its effects.
+    nuisance : sequence of str
+        Keys of :data:`NUISANCES`.
+
+    Returns
+    -------
+    tuple of Unknown
+        Positive parameters by their logarithm, with a weak prior.
+
+    Raises
+    ------
+    FitError
+        If a nuisance is unknown.
+    """
+    of_effects = effect_parameters(model)
+    found = []
+    for name in names:
+        entry = model.parameters.entry(name)
+        if name in of_effects and of_effects[name].lower <= 0.0:
+            size = max(abs(entry.value), abs(of_effects[name].starts[0]))
+            found.append(effect_unknown(of_effects[name], size))
+        elif entry.lower > 0.0:
+            found.append(Unknown(name, True, math.log(entry.value), WEAK, entry.lower,
+                                 entry.upper, 0.01))
+        else:
+            step = 0.01 * max(abs(entry.value), 1e-3)
+            found.append(Unknown(name, False, entry.value, math.inf, entry.lower, entry.upper,
+                                 step))
+    for name in nuisance:
+        if name not in NUISANCES:
+            raise FitError(f'unknown nuisance {name!r} (known: {", ".join(NUISANCES)})')
+        _, lower, upper, step = NUISANCES[name]
+        found.append(Unknown(name, False, 0.0, math.inf, lower, upper, step, extra=True))
+    return tuple(found)
+
+
+def starts_of(model: ModelFile, unknowns: Sequence[Unknown], count: int, seed: int
+              ) -> list[dict[str, float]]:
+    """
+    Return values to start from.
+
+    Parameters
+    ----------
+    model : ModelFile
+    unknowns : sequence of Unknown
+    count : int
+    seed : int
+
+    Returns
+    -------
+    list of dict
+        The first is the model's own; in the others the robot's parameters are spread by a
+        factor of :data:`AROUND` either way, evenly in the logarithm, and effects take the sizes
+        of the catalogue in turn.
+    """
+    draws = np.random.default_rng(seed)
+    of_effects = effect_parameters(model)
+    result = []
+    for number in range(max(1, count)):
+        values: dict[str, float] = {}
+        for unknown in unknowns:
+            shift = float(draws.uniform(-1.0, 1.0))
+            if unknown.extra:
+                values[unknown.name] = 0.0
+                continue
+            given = model.parameters[unknown.name]
+            if number and unknown.name in of_effects:
+                sizes = of_effects[unknown.name].starts
+                given = sizes[number % len(sizes)] * 1.3 ** shift
+            elif number and unknown.logarithmic:
+                given *= AROUND ** shift
+            values[unknown.name] = min(max(given, unknown.lower), unknown.upper)
+        result.append(values)
+    return result
+
+
+def search_bounds(parameters: Parameters, names: Sequence[str]
+                  ) -> tuple[FloatArray, FloatArray]:
+    """
+    Return the box of a search by populations: the paper's bounds where it states them.
+
+    Parameters
+    ----------
+    parameters : Parameters
+    names : sequence of str
+
+    Returns
+    -------
+    lower, upper : numpy.ndarray, shape (n_names,)
+    """
+    search = paper().search
+    rows = [(search[n].lower, search[n].upper) if n in search else
+            (parameters.entry(n).lower, parameters.entry(n).upper) for n in names]
+    box = np.array(rows, dtype=np.float64).reshape(-1, 2)
+    return box[:, 0], box[:, 1]
