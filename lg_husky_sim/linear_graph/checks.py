@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lg_husky_sim.errors import GraphError
-from lg_husky_sim.linear_graph.elements import Branch, Domain, Kind
+from lg_husky_sim.linear_graph.elements import Branch, Domain, Kind, TwoPort
 
 if TYPE_CHECKING:
     from lg_husky_sim.linear_graph.graph import Edge, LinearGraph, Node
@@ -136,14 +136,15 @@ def _check_through_cuts(graph: LinearGraph) -> None:
 
 
 def _check_characteristics(graph: LinearGraph) -> None:
-    for branch in graph.branches:
-        if branch.characteristic is None:
+    elements: list[Branch | TwoPort] = [*graph.branches, *graph.two_ports]
+    for element in elements:
+        if element.characteristic is None:
             continue
-        for text in branch.characteristic.of:
+        for text in element.characteristic.of:
             try:
                 graph.variable(text)
             except GraphError as error:
-                raise GraphError(f'characteristic of {branch.name!r}: {error}') from error
+                raise GraphError(f'characteristic of {element.name!r}: {error}') from error
 
 
 class Forest:

@@ -282,6 +282,9 @@ class TwoPort:
         Ratio as an expression in named parameters, SI.
     unit : str
         Unit of the ratio, for the unit check; '' for the SI unit.
+    characteristic : Characteristic, optional
+        In place of the value: the ratio as a function of variables (a modulated two-port, such
+        as a crank, or a motor with a controlled field). Each port then becomes a named effort.
 
     Raises
     ------
@@ -293,8 +296,9 @@ class TwoPort:
     kind: Kind
     port1: Port
     port2: Port
-    value: str
+    value: str = ''
     unit: str = ''
+    characteristic: Characteristic | None = None
 
     def __post_init__(self) -> None:
         """Check the two-port by itself."""
@@ -312,10 +316,14 @@ class TwoPort:
             if domain is Domain.THERMAL:
                 raise GraphError(f'port {label!r} is thermal: temperature times heat flow is no '
                                  'power, so no two-port can couple it; use a modulated source')
-        try:
-            parse(self.value)
-        except GraphError as error:
-            raise GraphError(f'two-port {self.name!r}: {error}') from error
+        if (self.characteristic is None) != bool(self.value):
+            raise GraphError(f'two-port {self.name!r} needs either a value (its ratio) or a '
+                             'characteristic')
+        if self.characteristic is None:
+            try:
+                parse(self.value)
+            except GraphError as error:
+                raise GraphError(f'two-port {self.name!r}: {error}') from error
 
 
 def _check_name(name: str, what: str) -> None:

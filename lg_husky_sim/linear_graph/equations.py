@@ -165,12 +165,11 @@ def _law(structure: Structure, edge: int, texts: Mapping[str, str]) -> Constitut
     graph = structure.graph
     owner = graph.edges[edge].owner
     primary, secondary = structure.primary(edge).name, structure.dual(edge).name
-    if isinstance(owner, Branch) and owner.characteristic is not None:
-        arguments = dict(zip(owner.characteristic.arguments, owner.characteristic.of,
-                             strict=True))
-        law = re.sub(r'\bz\d+\b', lambda match: arguments[match.group()],
-                     owner.characteristic.expression)
-        latex = _value_latex(owner.characteristic.expression, {
+    if owner.characteristic is not None:
+        known = structure.laws.get(edge, owner.characteristic)
+        arguments = dict(zip(known.arguments, known.of, strict=True))
+        law = re.sub(r'\bz\d+\b', lambda match: arguments[match.group()], known.expression)
+        latex = _value_latex(known.expression, {
             name: latex_of(text) for name, text in arguments.items()})
         return Constitutive(owner.name, f'{primary} = {law}',
                             f'{latex_of(primary)} = {latex}')

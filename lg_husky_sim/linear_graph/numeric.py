@@ -14,6 +14,7 @@ from typing import Any
 from lg_husky_sim.errors import GraphError, ParameterError
 from lg_husky_sim.linear_graph.expressions import compile_tuple, evaluate, GLOBALS, names_in
 from lg_husky_sim.linear_graph.graph import LinearGraph
+from lg_husky_sim.linear_graph.loops import effort_order
 from lg_husky_sim.linear_graph.modular import generic_numbers
 from lg_husky_sim.linear_graph.state_space import FloatArray, StateSpace
 from lg_husky_sim.linear_graph.structure import analyse, Structure
@@ -23,7 +24,8 @@ SMALLEST = float(np.finfo(np.float64).tiny)
 TOLERANCE = 1e-9
 
 
-def compile_numeric(graph: LinearGraph, outputs: Sequence[str] = ()) -> NumericModel:
+def compile_numeric(graph: LinearGraph, outputs: Sequence[str] = (), *,
+                    chained: bool = False) -> NumericModel:
     """
     Analyse a graph once, for many evaluations with different parameters.
 
@@ -33,6 +35,9 @@ def compile_numeric(graph: LinearGraph, outputs: Sequence[str] = ()) -> NumericM
         The graph.
     outputs : sequence of str
         Variables to put out, such as ``'v(M_H)'``, ``'i(L_1)'`` or ``'tau(T_ML.2)'``.
+    chained : bool
+        Allow the argument of one effort to hang at once on other efforts (matrix N). A loop is
+        refused in any case.
 
     Returns
     -------
@@ -55,7 +60,7 @@ def compile_numeric(graph: LinearGraph, outputs: Sequence[str] = ()) -> NumericM
     >>> compile_numeric(graph, ['v(m)']).at({'m': 2.0, 'b': 3.0}).A
     array([[-1.5]])
     """
-    return NumericModel(analyse(graph, outputs))
+    return NumericModel(analyse(graph, outputs), chained)
 
 
 class NumericModel:
@@ -66,11 +71,20 @@ class NumericModel:
     ----------
     structure : Structure
         The analysed graph.
+    chained : bool
+        Whether efforts may hang on others, see :func:`compile_numeric`.
+
+    Attributes
+    ----------
+    order : tuple of int
+        Positions of the efforts in an order in which they can be evaluated.
     """
 
-    def __init__(self, structure: Structure) -> None:
+    def __init__(self, structure: Structure, chained: bool = False) -> None:
         """Lay out the constant matrices and check the efforts."""
         self.structure = structure
+        self.chained = chained
+        self.order: tuple[int, ...] = ()
         self.graph = structure.graph
         self.states = structure.names(structure.states)
         self.inputs = structure.inputs
@@ -205,7 +219,8 @@ class NumericModel:
         return StateSpace(
             rates[:, :n], rates[:, n:n + m], out[:, :n], out[:, n:n + m], derivative,
             feed_derivative[q:], rates[:, n + m:n + m + k], arguments[:, :n],
-            arguments[:, n:n + m], out[:, n + m:n + m + k], *self._names)
+            arguments[:, n:n + m], out[:, n + m:n + m + k], arguments[:, n + m:n + m + k],
+            *self._names)
 
     def _generic_values(self) -> FloatArray:
         """Return generic positive values, the same for the same parameter."""
@@ -222,6 +237,7 @@ class NumericModel:
 
     def _refuse_effort_loops(self) -> None:
         structure = self.structure
+        self.order = tuple(range(len(structure.efforts)))
         s, n, q = len(structure.excess), len(structure.states), len(structure.arguments)
         if not structure.efforts and not s:
             return
@@ -235,8 +251,6 @@ class NumericModel:
                     f'{structure.dual(edge).name} of excess storage {name!r} is set by '
                     f'{self.graph.edges[other].name!r}, whose rate of change is not known; '
                     'put a D-type in series with the one or in parallel to the other')
-        owners = [edge for edge in structure.efforts
-                  for _ in structure.characteristic(edge).of]
         arguments = rows[n + s:n + s + q]
         direct = arguments[:, to_effort:to_excess]
         if s:
@@ -246,22 +260,15 @@ class NumericModel:
             direct = direct + arguments[:, to_excess:] * storage[n:] @ dependent[:, :n] @ rates
             self._refuse_derivatives(arguments[:, to_excess:] * storage[n:],
                                      dependent[:, to_input:to_effort])
-        for row, column in zip(*np.nonzero(np.abs(direct) > TOLERANCE), strict=True):
-            self._raise_loop(int(row), owners[row], structure.efforts[column])
+        counts = [len(structure.characteristic(edge).of) for edge in structure.efforts]
+        self.order = effort_order(np.abs(direct) > TOLERANCE, counts, self.efforts,
+                                  self.arguments, self.chained)
 
     def _refuse_derivatives(self, lever: FloatArray, by_input: FloatArray) -> None:
         for row, column in zip(*np.nonzero(np.abs(lever @ by_input) > TOLERANCE), strict=True):
             raise GraphError(
                 f'the argument {self.arguments[row]} of a non-linear law hangs on the rate of '
                 f'change of input {self.inputs[column]!r}; put a D-type in series with the source')
-
-    def _raise_loop(self, argument: int, owner: int, cause: int) -> None:
-        edges = self.graph.edges
-        loop = f'{edges[cause].name} -> {self.arguments[argument]} -> {edges[owner].name}'
-        raise GraphError(
-            f'algebraic loop {loop}: the argument {self.arguments[argument]} of the non-linear '
-            f'law of {edges[owner].name!r} hangs at once on the effort of {edges[cause].name!r}; '
-            'put a storage between them, or make the law linear')
 
     def _singular(self) -> ParameterError:
         owners = dict.fromkeys(

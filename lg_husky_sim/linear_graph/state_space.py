@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-MATRICES = ('A', 'B', 'C', 'D', 'E', 'F', 'G', 'H', 'K', 'L_c')
+MATRICES = ('A', 'B', 'C', 'D', 'E', 'F', 'G', 'H', 'K', 'L_c', 'N')
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,11 +18,12 @@ class StateSpace:
     """
     Numbers of a state-space model derived from a linear graph.
 
-    dx/dt = A x + B u + E du/dt + G f(z),  z = H x + K u,
+    dx/dt = A x + B u + E du/dt + G f(z),  z = H x + K u + N f(z),
     y = C x + D u + F du/dt + L_c f(z)
 
-    E and F are zero unless the graph has excess storages that inputs act on (Rowell and Wormley,
-    ch. 5.5); :meth:`standard_form` removes E.
+    N is zero unless the model was compiled with chained efforts; then an effort may hang on
+    others, but never on itself. E and F are zero unless the graph has excess storages that
+    inputs act on (Rowell and Wormley, ch. 5.5); :meth:`standard_form` removes E.
 
     Parameters
     ----------
@@ -30,7 +31,7 @@ class StateSpace:
         State equations, SI.
     C, D, F, L_c : numpy.ndarray, shapes (p, n), (p, m), (p, m), (p, k)
         Output equations; L_c is the feed-through of efforts.
-    H, K : numpy.ndarray, shapes (q, n), (q, m)
+    H, K, N : numpy.ndarray, shapes (q, n), (q, m), (q, k)
         Arguments z of the efforts, one effort's after the other's.
     states, inputs, outputs, efforts, arguments : tuple of str
         Names of x (n), u (m), y (p), f (k) and z (q).
@@ -46,6 +47,7 @@ class StateSpace:
     H: FloatArray
     K: FloatArray
     L_c: FloatArray
+    N: FloatArray
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]

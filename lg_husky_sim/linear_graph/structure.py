@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from lg_husky_sim.errors import GraphError
-from lg_husky_sim.linear_graph.elements import Branch, Characteristic, Kind, SOURCES
+from lg_husky_sim.linear_graph.elements import Characteristic, Kind, SOURCES
 from lg_husky_sim.linear_graph.graph import LinearGraph, Variable
 from lg_husky_sim.linear_graph.normal_tree import normal_tree, NormalTree
 import numpy as np
@@ -94,6 +94,8 @@ class Structure:
         Edge of each source and the position of its input.
     efforts : tuple of int
         Edges whose value is a named effort.
+    laws : mapping of int to Characteristic
+        The law of each effort.
     algebraic : tuple of int
         Edges solved for.
     terms : tuple of Term
@@ -117,6 +119,7 @@ class Structure:
     inputs: tuple[str, ...]
     input_edges: tuple[tuple[int, int], ...]
     efforts: tuple[int, ...]
+    laws: Mapping[int, Characteristic]
     algebraic: tuple[int, ...]
     terms: tuple[Term, ...]
     values: tuple[Value, ...]
@@ -153,11 +156,8 @@ class Structure:
         return tuple(self.primary(edge).name for edge in edges)
 
     def characteristic(self, edge: int) -> Characteristic:
-        """Return the characteristic of an effort's branch."""
-        owner = self.graph.edges[edge].owner
-        if not isinstance(owner, Branch) or owner.characteristic is None:
-            raise GraphError(f'{owner.name!r} has no characteristic')
-        return owner.characteristic
+        """Return the law of an effort."""
+        return self.laws[edge]
 
 
 def analyse(graph: LinearGraph, outputs: Sequence[str] = ()) -> Structure:
@@ -200,7 +200,8 @@ def analyse(graph: LinearGraph, outputs: Sequence[str] = ()) -> Structure:
     return Structure(
         graph, tree, _secondary(graph, in_tree), in_tree, states,
         tuple(edge for edge in storages if edge in dependent),
-        tuple(builder.inputs), tuple(builder.input_edges), tuple(builder.efforts),
+        tuple(builder.inputs), tuple(builder.input_edges), tuple(builder.laws),
+        builder.laws,
         tuple(dict.fromkeys(builder.algebraic)), tuple(builder.terms), tuple(builder.values),
         builder.storage_values,
         frozenset(at for at, branch in enumerate(graph.branches) if branch.is_stiffness),
@@ -218,6 +219,17 @@ def _secondary(graph: LinearGraph, in_tree: tuple[bool, ...]) -> FloatArray:
     return secondary + 0.0
 
 
+_Part = tuple[int, bool, int, Variable]
+
+
+def modulated(ratio: Characteristic, inverse: bool, sign: int, variable: str) -> Characteristic:
+    """Return the law of one port of a modulated two-port: sign * ratio^(+-1) * variable."""
+    last = f'z{len(ratio.of) + 1}'
+    factor = f'{last}/({ratio.expression})' if inverse else f'({ratio.expression})*{last}'
+    return Characteristic(f'-{factor}' if sign < 0 else factor, (*ratio.of, variable),
+                          ratio.parameters, ratio.modulated)
+
+
 class _Builder:
     """Collects the equations edge by edge."""
 
@@ -225,7 +237,7 @@ class _Builder:
         self.graph, self.in_tree = graph, in_tree
         self.inputs: list[str] = []
         self.input_edges: list[tuple[int, int]] = []
-        self.efforts: list[int] = []
+        self.laws: dict[int, Characteristic] = {}
         self.arguments: list[Variable] = []
         self.algebraic: list[int] = []
         self.terms: list[Term] = []
@@ -249,17 +261,22 @@ class _Builder:
                 self.storage_values[edge] = self._value(branch.name, branch.value, 'positive')
         for position, two_port in enumerate(self.graph.two_ports):
             one = len(self.graph.branches) + 2 * position
+            equations = self._transformer if two_port.kind is Kind.TRANSFORMER else self._gyrator
+            parts = equations(one, one + 1)
+            if two_port.characteristic is not None:
+                for edge, inverse, sign, source in parts:
+                    self._characteristic(edge, modulated(
+                        two_port.characteristic, inverse, sign, source.name))
+                continue
             at = self._value(two_port.name, two_port.value, 'not zero')
-            if two_port.kind is Kind.TRANSFORMER:
-                self._transformer(one, one + 1, at)
-            else:
-                self._gyrator(one, one + 1, at)
+            for edge, inverse, sign, source in parts:
+                self._term(edge, at, inverse, sign, source)
 
     def _characteristic(self, edge: int, characteristic: Characteristic) -> None:
         linear = characteristic.linear
         sources = [self.graph.variable(text) for text in characteristic.of]
         if linear is None:
-            self.efforts.append(edge)
+            self.laws[edge] = characteristic
             self.arguments += sources
             return
         self.algebraic.append(edge)
@@ -269,21 +286,19 @@ class _Builder:
                 at = self._value(name, linear[argument], 'any')
                 self._term(edge, at, False, 1, source)
 
-    def _transformer(self, one: int, two: int, at: int) -> None:
+    def _transformer(self, one: int, two: int) -> tuple[_Part, _Part]:
         if self.in_tree[one]:       # v1 = n v2, f2 = -n f1
-            self._term(one, at, False, 1, self._variable(two, True))
-            self._term(two, at, False, -1, self._variable(one, False))
-        else:                       # v2 = v1/n, f1 = -f2/n
-            self._term(two, at, True, 1, self._variable(one, True))
-            self._term(one, at, True, -1, self._variable(two, False))
+            return ((one, False, 1, self._variable(two, True)),
+                    (two, False, -1, self._variable(one, False)))
+        return ((two, True, 1, self._variable(one, True)),         # v2 = v1/n, f1 = -f2/n
+                (one, True, -1, self._variable(two, False)))
 
-    def _gyrator(self, one: int, two: int, at: int) -> None:
+    def _gyrator(self, one: int, two: int) -> tuple[_Part, _Part]:
         if self.in_tree[one]:       # v1 = r f2, v2 = -r f1
-            self._term(one, at, False, 1, self._variable(two, False))
-            self._term(two, at, False, -1, self._variable(one, False))
-        else:                       # f1 = -v2/r, f2 = v1/r
-            self._term(one, at, True, -1, self._variable(two, True))
-            self._term(two, at, True, 1, self._variable(one, True))
+            return ((one, False, 1, self._variable(two, False)),
+                    (two, False, -1, self._variable(one, False)))
+        return ((one, True, -1, self._variable(two, True)),        # f1 = -v2/r, f2 = v1/r
+                (two, True, 1, self._variable(one, True)))
 
     def _variable(self, edge: int, is_across: bool) -> Variable:
         return Variable(edge, is_across, self.graph.variable_name(edge, is_across))

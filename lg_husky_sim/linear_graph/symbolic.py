@@ -24,14 +24,14 @@ class SymbolicStateSpace:
     """
     A graph's state-space model in symbols.
 
-    dx/dt = A x + B u + E du/dt + G f(z),  z = H x + K u,
+    dx/dt = A x + B u + E du/dt + G f(z),  z = H x + K u + N f(z),
     y = C x + D u + F du/dt + L_c f(z)
 
     Parameters
     ----------
     graph : LinearGraph
         Where it comes from.
-    A, B, C, D, E, F, G, H, K, L_c : sympy.Matrix
+    A, B, C, D, E, F, G, H, K, L_c, N : sympy.Matrix
         As in :class:`~lg_husky_sim.linear_graph.state_space.StateSpace`.
     states, inputs, outputs, efforts, arguments : tuple of str
         Names of x, u, y, f and z.
@@ -50,6 +50,7 @@ class SymbolicStateSpace:
     H: Any
     K: Any
     L_c: Any
+    N: Any
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
@@ -111,7 +112,7 @@ def derive(graph: LinearGraph, outputs: Sequence[str] = (), *,
     import sympy
 
     structure = analyse(graph, outputs)
-    NumericModel(structure)     # refuses loops through non-linear laws
+    NumericModel(structure, chained=True)     # refuses loops through non-linear laws
     texts = [value.owner if by_element and value.rule != 'any' else value.text
              for value in structure.values]
     derivation = _Derivation(structure, texts)
@@ -132,8 +133,8 @@ def derive(graph: LinearGraph, outputs: Sequence[str] = (), *,
     return SymbolicStateSpace(
         graph, matrix(rates, 0, n), matrix(rates, n, m), matrix(y, 0, n), matrix(y, n, m),
         matrix(rates, after, m), matrix(y, after, m), matrix(rates, n + m, k), matrix(z, 0, n),
-        matrix(z, n, m), matrix(y, n + m, k), structure.names(structure.states),
-        structure.inputs, tuple(v.name for v in structure.outputs),
+        matrix(z, n, m), matrix(y, n + m, k), matrix(z, n + m, k),
+        structure.names(structure.states), structure.inputs, tuple(v.name for v in structure.outputs),
         tuple(graph.edges[edge].name for edge in structure.efforts),
         tuple(v.name for v in structure.arguments), structure.tree.dependent)
 
