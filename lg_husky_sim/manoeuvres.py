@@ -120,9 +120,7 @@ class Manoeuvre:
         """Check length and rate."""
         if not self.steps:
             raise CommandError('steps is empty; at least one is needed')
-        if not 0.0 < self.rate <= LARGEST_RATE:
-            raise CommandError(
-                f'rate = {self.rate:g} Hz must be positive and at most {LARGEST_RATE:g} Hz')
+        checked_rate(self.rate)
         if self.duration > LONGEST or self.duration * self.rate > MOST_SAMPLES:
             raise CommandError(
                 f'{self.duration:g} s at {self.rate:g} Hz is too long: at most {LONGEST:g} s and '
@@ -156,6 +154,21 @@ class Manoeuvre:
         share[ramps == 0.0] = 1.0
         values = before[which] + share[:, None] * (targets[which] - before[which])
         return TimeSeries(times, values, ('forward', 'yaw'))
+
+
+def checked_rate(rate: float) -> float:
+    """
+    Return a rate [Hz] that is in range.
+
+    Raises
+    ------
+    CommandError
+        If it is not positive or too high.
+    """
+    if not 0.0 < rate <= LARGEST_RATE:
+        raise CommandError(
+            f'rate = {rate:g} Hz must be positive and at most {LARGEST_RATE:g} Hz')
+    return rate
 
 
 def builtin_manoeuvres() -> dict[str, Manoeuvre]:

@@ -7,7 +7,7 @@ Reads rosbag2 (MCAP, sqlite3) and ROS 1 bags without ROS, by way of the library 
 """
 
 from lg_husky_sim.recording.reader import read_recording
-from lg_husky_sim.recording.recording import Recording, Segment, segments
+from lg_husky_sim.recording.recording import Recording, Segment, segments, windows
 from lg_husky_sim.recording.topics import TopicMap
 from lg_husky_sim.recording.writer import write_recording
 
@@ -17,5 +17,6 @@ __all__ = [
     'TopicMap',
     'read_recording',
     'segments',
+    'windows',
     'write_recording',
 ]

@@ -191,12 +191,61 @@ def segments(recording: Recording, gap: float = DEFAULT_GAP) -> tuple[Segment, .
     for start, end in stretches:
         if not np.isfinite(start) or end - start < gap:
             continue
-        parts = {name: _part(name, series, start, end)
-                 for name, series in recording.streams.items()}
-        if all(len(parts[name]) >= 2 for name in CONTINUOUS if name in parts):
-            kept = {name: part for name, part in parts.items() if len(part)}
-            found.append(Segment(recording.name, len(found), start, end, kept))
+        parts = cut(recording.streams, start, end)
+        if all(name in parts and len(parts[name]) >= 2
+               for name in CONTINUOUS if name in recording.streams):
+            found.append(Segment(recording.name, len(found), start, end, parts))
     return tuple(found)
+
+
+def windows(segment: Segment, length: float) -> tuple[Segment, ...]:
+    """
+    Cut a segment into windows of one length.
+
+    Parameters
+    ----------
+    segment : Segment
+    length : float
+        Length of a window [s], positive.
+
+    Returns
+    -------
+    tuple of Segment
+        Numbered from 0 within the segment; the rest at the end is one of them when it is at
+        least half as long. A segment shorter than that is returned whole.
+
+    Raises
+    ------
+    RecordingError
+        If `length` is not positive.
+    """
+    if not length > 0.0:
+        raise RecordingError(f'length = {length} s of a window must be positive')
+    count = max(1, int(np.floor(segment.duration / length + 0.5)))
+    edges = [segment.start + k * length for k in range(count)]
+    ends = [*edges[1:], min(edges[-1] + length, segment.end) if count > 1 else segment.end]
+    return tuple(Segment(segment.recording, k, start, end, cut(segment.streams, start, end))
+                 for k, (start, end) in enumerate(zip(edges, ends, strict=True)))
+
+
+def cut(
+    streams: Mapping[str, TimeSeries], start: float, end: float,
+) -> dict[str, TimeSeries]:
+    """
+    Return the streams within bounds; those without a sample there are left out.
+
+    Parameters
+    ----------
+    streams : mapping of str to TimeSeries
+    start, end : float
+        Bounds [s], both inclusive. The command that holds at `start` becomes its first row.
+
+    Returns
+    -------
+    dict of str to TimeSeries
+    """
+    parts = {name: _part(name, series, start, end) for name, series in streams.items()}
+    return {name: part for name, part in parts.items() if len(part)}
 
 
 def _stretches(times: FloatArray, gap: float) -> list[tuple[float, float]]:
