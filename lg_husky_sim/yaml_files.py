@@ -10,9 +10,8 @@ from pathlib import Path
 import re
 from typing import Any
 
-import yaml
-
 from lg_husky_sim.errors import LgHuskyError
+import yaml
 
 LARGEST = 4_000_000
 """Largest file that is read [bytes]."""
@@ -62,6 +61,12 @@ def _refuse_bombs(text: str) -> None:
             raise yaml.YAMLError(f'nested deeper than {DEEPEST} levels')
         if aliases > MOST_ALIASES:
             raise yaml.YAMLError(f'more than {MOST_ALIASES} aliases')
+
+
+def shown(value: object) -> str:
+    """Return a value as an error message shows it: in one line, cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= 60 else f'{text[:57]}...'
 
 
 def _reason(error: Exception) -> str:

@@ -31,7 +31,7 @@ def test_scalars_are_what_people_mean(text: str, value: object) -> None:
     ('a: [1, 2', r'^not YAML: .* in line \d, column \d$'),
     ('!!python/object:os.system {}', r'^not YAML: could not determine a constructor'),
     ('[' * 100_000, '^not YAML: nested deeper than 50 levels$'),
-    ('&a [*a, *b]', r"^not YAML: found undefined alias"),
+    ('&a [*a, *b]', r'^not YAML: found undefined alias'),
     ('? {a: 1}\n: 2', 'not YAML: '),
     ('x: 2026-99-99', 'not YAML: month must be in 1..12'),
 ])

@@ -11,11 +11,10 @@ import enum
 from functools import cache
 from typing import Any
 
-import yaml
-
 from lg_husky_sim.errors import ModelFileError, ParameterError
 from lg_husky_sim.husky.parameters import Parameter
 from lg_husky_sim.resources import config_path
+from lg_husky_sim.yaml_files import read_yaml, shown
 
 
 class Subsystem(enum.Enum):
@@ -49,7 +48,8 @@ class Onset:
     value : float
         Time in a recording [s], or x in the world [m].
     recording : str
-        Name of the recording in which it begins; empty for "in each".
+        Name of the recording in which a time onset lies: the effect is absent in earlier ones
+        and stays in later ones. Empty where it begins at that time in each.
     """
 
     kind: OnsetKind
@@ -111,7 +111,7 @@ class EffectKind:
         Whether it only makes sense with an onset.
     """
 
-    id: str
+    id: str  # noqa: A003
     subsystem: Subsystem
     title: str
     elements: tuple[str, ...]
@@ -143,7 +143,7 @@ class Effect:
         If the id, side or shape is unknown.
     """
 
-    id: str
+    id: str  # noqa: A003
     side: str = ''
     shape: str = ''
     late: bool = False
@@ -159,7 +159,8 @@ class Effect:
                                      ('shape', self.shape, kind.shapes)):
             if value not in allowed:
                 raise ParameterError(
-                    f'{what} {value!r} of effect {self.id} is not one of {", ".join(allowed)}')
+                    f'{what} {shown(value)} of effect {self.id} is not one of '
+                    f'{", ".join(allowed)}')
 
     @property
     def kind(self) -> EffectKind:
@@ -201,9 +202,8 @@ def catalogue() -> Mapping[str, EffectKind]:
         If the file is not a catalogue.
     """
     path = config_path('effects.yaml')
-    with open(path, encoding='utf-8') as stream:
-        data = yaml.safe_load(stream)
-    if not isinstance(data, dict) or data.get('schema') != 'lg_husky_sim/effects/1':
+    data = read_yaml(path, ModelFileError)
+    if data.get('schema') != 'lg_husky_sim/effects/1':
         raise ModelFileError(f'{path}: not a catalogue of effects (schema lg_husky_sim/effects/1)')
     return {name: _read_kind(name, entry) for name, entry in data['effects'].items()}
 
@@ -221,5 +221,5 @@ def effect_kind(name: str) -> EffectKind:
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1)
         hint = f'; did you mean {near[0]}?' if near else ''
-        raise ParameterError(f'unknown effect {name!r}{hint} (known: {", ".join(known)})')
+        raise ParameterError(f'unknown effect {shown(name)}{hint} (known: {", ".join(known)})')
     return known[name]

@@ -12,17 +12,15 @@ from pathlib import Path
 import tempfile
 from typing import Any
 
-import yaml
-
 from lg_husky_sim.errors import LgHuskyError, ModelFileError, ParameterError
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import Drivetrain, Structure
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.resources import config_path
+from lg_husky_sim.yaml_files import read_yaml, shown
+import yaml
 
 SCHEMA = 'lg_husky_sim/model/1'
-#: Largest model file that is read [bytes].
-LARGEST = 4_000_000
 _KEYS = {'value', 'unit', 'lower', 'upper', 'tolerance', 'free', 'source', 'low', 'high'}
 
 
@@ -52,10 +50,14 @@ def default_model_path() -> Path:
 
 def _number(name: str, key: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ModelFileError(f'{name}: {key} = {value!r} is not a number')
-    if not math.isfinite(value):
-        raise ModelFileError(f'{name}: {key} = {value} is not finite')
-    return float(value)
+        raise ModelFileError(f'{name}: {key} = {shown(value)} is not a number')
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ModelFileError(f'{name}: {key} = {shown(value)} is not finite')
+    return number
 
 
 def _mapping(what: str, value: object) -> dict[str, Any]:
@@ -69,13 +71,14 @@ def _parameter(name: str, entry: object) -> Parameter:
     unknown = sorted(set(data) - _KEYS)
     if unknown:
         raise ModelFileError(
-            f'parameter {name}: unknown key {unknown[0]!r} (allowed: {", ".join(sorted(_KEYS))})')
+            f'parameter {name}: unknown key {shown(unknown[0])} '
+            f'(allowed: {", ".join(sorted(_KEYS))})')
     for key in ('value', 'unit', 'lower', 'upper', 'source'):
         if key not in data:
             raise ModelFileError(f'parameter {name}: {key} is missing')
     free = data.get('free', False)
     if not isinstance(free, bool):
-        raise ModelFileError(f'parameter {name}: free = {free!r} is neither true nor false')
+        raise ModelFileError(f'parameter {name}: free = {shown(free)} is neither true nor false')
     interval = [None if data.get(key) is None else _number(name, key, data[key])
                 for key in ('low', 'high')]
     return Parameter(
@@ -90,10 +93,10 @@ def _effect(index: int, entry: object, shared: set[str]
     data = _mapping(f'effect {index + 1}', entry)
     unknown = sorted(set(data) - {'effect', 'side', 'shape', 'late', 'parameters'})
     if unknown:
-        raise ModelFileError(f'effect {index + 1}: unknown key {unknown[0]!r}')
+        raise ModelFileError(f'effect {index + 1}: unknown key {shown(unknown[0])}')
     late = data.get('late', False)
     if not isinstance(late, bool):
-        raise ModelFileError(f'effect {index + 1}: late = {late!r} is neither true nor false')
+        raise ModelFileError(f'effect {index + 1}: late = {shown(late)} is neither true nor false')
     effect = Effect(str(data.get('effect', '')), str(data.get('side') or ''),
                     str(data.get('shape') or ''), late)
     given = _mapping(f'effect {effect.id}: parameters', data.get('parameters', {}))
@@ -101,7 +104,7 @@ def _effect(index: int, entry: object, shared: set[str]
     parameters = []
     for name in given:
         if name not in known:
-            raise ModelFileError(f'effect {effect.id}: unknown parameter {name!r} '
+            raise ModelFileError(f'effect {effect.id}: unknown parameter {shown(name)} '
                                  f'(known: {", ".join(known)})')
     for name, template in known.items():
         if name not in given:
@@ -121,7 +124,7 @@ def _onset(data: object) -> Onset | None:
     kinds = [kind.value for kind in OnsetKind]
     if entry.get('kind') not in kinds:
         raise ModelFileError(
-            f'structure.onset.kind = {entry.get("kind")!r} is not one of {", ".join(kinds)}')
+            f'structure.onset.kind = {shown(entry.get("kind"))} is not one of {", ".join(kinds)}')
     return Onset(OnsetKind(entry['kind']), _number('structure.onset', 'value',
                                                    entry.get('value')),
                  str(entry.get('recording', '')))
@@ -150,15 +153,15 @@ def model_from_data(data: object, name: str) -> ModelFile:
     try:
         content = _mapping('the file', data)
         if content.get('schema') != SCHEMA:
-            raise ModelFileError(f'schema is {content.get("schema")!r}, expected {SCHEMA!r}')
+            raise ModelFileError(f'schema is {shown(content.get("schema"))}, expected {SCHEMA!r}')
         unknown = sorted(set(content) - {'schema', 'about', 'structure', 'parameters', 'effects'})
         if unknown:
-            raise ModelFileError(f'unknown key {unknown[0]!r}')
+            raise ModelFileError(f'unknown key {shown(unknown[0])}')
         structure = _mapping('structure', content.get('structure', {}))
         drivetrains = [d.value for d in Drivetrain]
         drivetrain = structure.get('drivetrain', 'simplified')
         if drivetrain not in drivetrains:
-            raise ModelFileError(f'structure.drivetrain = {drivetrain!r} is not one of '
+            raise ModelFileError(f'structure.drivetrain = {shown(drivetrain)} is not one of '
                                  f'{", ".join(drivetrains)}')
         entries = [_parameter(key, entry) for key, entry in _mapping(
             'parameters', content.get('parameters')).items()]
@@ -205,17 +208,9 @@ def load_model(path: str | os.PathLike[str] | None = None) -> ModelFile:
     """
     place = Path(path) if path is not None else default_model_path()
     try:
-        if place.stat().st_size > LARGEST:
-            raise ModelFileError(f'{place}: larger than {LARGEST} bytes, not a model file')
-        text = place.read_text(encoding='utf-8')
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, 'strerror', None) or 'not a text file'
-        raise ModelFileError(f'{place}: {reason}') from error
-    try:
-        data = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        line = str(error).replace('\n', ' ')[:200]
-        raise ModelFileError(f'{place}: not YAML: {line}') from error
+        data = read_yaml(place, ModelFileError)
+    except ModelFileError as error:
+        raise ModelFileError(f'{place}: {error}') from error
     name = 'husky.yaml' if place == default_model_path() else str(place)
     return model_from_data(data, name)
 
@@ -249,7 +244,8 @@ def parse_settings(pairs: tuple[str, ...]) -> dict[str, float]:
         except ValueError:
             equals = ''
         if not equals or not name.strip():
-            raise ParameterError(f'--set {pair!r} is not of the form NAME=VALUE with a number')
+            raise ParameterError(
+                f'--set {shown(pair)} is not of the form NAME=VALUE with a number')
     return settings
 
 
@@ -276,11 +272,10 @@ def model_data(model: ModelFile) -> dict[str, object]:
         'schema': SCHEMA, 'about': model.about, 'structure': structure,
         'parameters': {p.name: _entry(p) for p in model.parameters.entries
                        if p.name not in of_effects or p.name in shared},
-        'effects': [{
-            'effect': effect.id, 'side': effect.side, 'shape': effect.shape,
-            'late': effect.late,
-            'parameters': {p.name: _entry(model.parameters.entry(p.name))
-                           for p in effect.parameters() if p.name not in shared}}
+        'effects': [
+            {'effect': effect.id, 'side': effect.side, 'shape': effect.shape, 'late': effect.late,
+             'parameters': {p.name: _entry(model.parameters.entry(p.name))
+                            for p in effect.parameters() if p.name not in shared}}
             for effect in model.structure.effects],
     }
 
