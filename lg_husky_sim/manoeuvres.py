@@ -27,8 +27,8 @@ from typing import Any
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import TimeSeries
+from lg_husky_sim.yaml_files import read_yaml, shown
 import numpy as np
-import yaml
 
 SCHEMA = 'lg_husky_sim/commands/1'
 BUILTIN_SCHEMA = 'lg_husky_sim/manoeuvres/1'
@@ -39,8 +39,6 @@ LARGEST_RATE = 1000.0
 LONGEST = 100_000.0
 """Longest script [s]."""
 MOST_SAMPLES = 5_000_000
-LARGEST_FILE = 1_000_000
-"""Largest script file [bytes]."""
 FASTEST = 100.0
 """Largest speed [m/s] or yaw rate [rad/s] that is no slip of the pen."""
 
@@ -173,7 +171,7 @@ def checked_rate(rate: float) -> float:
 
 def builtin_manoeuvres() -> dict[str, Manoeuvre]:
     """Return the manoeuvres of ``config/manoeuvres.yaml`` by name, in its order."""
-    data = _yaml(config_path('manoeuvres.yaml'))
+    data = read_yaml(config_path('manoeuvres.yaml'), CommandError)
     _check_schema(data, BUILTIN_SCHEMA)
     return {name: _manoeuvre(name, entry)
             for name, entry in _mapping('manoeuvres', data.get('manoeuvres')).items()}
@@ -200,7 +198,7 @@ def load_manoeuvre(path: Path) -> Manoeuvre:
         allowed.
     """
     try:
-        data = _yaml(path)
+        data = read_yaml(path, CommandError)
         _check_schema(data, SCHEMA)
         return _manoeuvre(path.stem, {k: v for k, v in data.items() if k != 'schema'})
     except CommandError as error:
@@ -224,22 +222,9 @@ def find_manoeuvre(name: str) -> Manoeuvre:
     return known[name]
 
 
-def _yaml(path: Path) -> dict[str, Any]:
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise CommandError(f'larger than {LARGEST_FILE} bytes, not a command script')
-        data = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, 'strerror', None) or 'not a text file'
-        raise CommandError(str(reason)) from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise CommandError(f'not YAML: {" ".join(str(error).split())[:200]}') from error
-    return _mapping('the file', data)
-
-
 def _check_schema(data: Mapping[str, Any], schema: str) -> None:
     if data.get('schema') != schema:
-        raise CommandError(f'schema is {data.get("schema")!r}, expected {schema!r}')
+        raise CommandError(f'schema is {shown(data.get("schema"))}, expected {schema!r}')
 
 
 def _mapping(what: str, value: object) -> dict[str, Any]:
@@ -274,12 +259,12 @@ def _step(place: int, entry: object) -> Step:
 def _known(data: Mapping[str, Any], keys: tuple[str, ...]) -> None:
     for key in data:
         if key not in keys:
-            raise CommandError(f'unknown key {key!r} (allowed: {", ".join(keys)})')
+            raise CommandError(f'unknown key {shown(key)} (allowed: {", ".join(keys)})')
 
 
 def _number(name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise CommandError(f'{name} = {str(value)[:40]!r} is not a number')
+        raise CommandError(f'{name} = {shown(value)} is not a number')
     try:
         return float(value)
     except OverflowError as error:

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'lg_husky_sim'
 MAX_LINES = 400
 
-BASE = {'errors', 'extras', 'jit', 'manoeuvres', 'resources', 'signals', 'yaml_files'}
+BASE = {'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'resources', 'signals', 'yaml_files'}
 MODEL = {'linear_graph', 'husky', 'simulation'}
 DATA = MODEL | {'recording', 'comparison'}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -22,6 +22,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'signals': {'errors'},
     'resources': {'errors'},
     'extras': {'errors'},
+    'folders': {'errors'},
     'yaml_files': {'errors'},
     'jit': {'errors', 'extras'},
     'manoeuvres': {'errors', 'signals', 'resources', 'yaml_files'},
