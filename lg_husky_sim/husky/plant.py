@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -125,6 +126,30 @@ class Plant:
     def linear(self) -> bool:
         """Whether there are no efforts: the hold is then exact."""
         return all(s.laws.size == 0 for s in self.sets)
+
+    def in_recording(self, name: str, earlier: Collection[str] = ()) -> Plant:
+        """
+        Return the plant as it is in one recording.
+
+        An effect that begins at a time in a named recording is absent in earlier recordings and
+        stays in all others.
+
+        Parameters
+        ----------
+        name : str
+            Name of the recording.
+        earlier : collection of str
+            Names of the recordings made before that of the onset.
+
+        Returns
+        -------
+        Plant
+            With the onset where it falls into this recording, else with one set only.
+        """
+        onset = self.onset
+        if onset is None or len(self.sets) < 2 or onset.recording in ('', name):
+            return self
+        return Plant((self.sets[0 if name in earlier else 1],), self.states)
 
     def observe(self, truth: TimeSeries) -> TimeSeries:
         """

@@ -174,13 +174,31 @@ class Observations:
         -------
         numpy.ndarray, shape (n_values,)
         """
-        simulator = Simulator(plant, PERIOD, fine_pose=False)
         given = extra or {}
+        simulators: dict[str, Simulator] = {}
         parts = []
         for piece in self.pieces:
+            if piece.recording not in simulators:
+                own = self.plant_in(plant, piece.recording)
+                same = [s for s in simulators.values() if s.plant is own]
+                simulators[piece.recording] = same[0] if same else Simulator(
+                    own, PERIOD, fine_pose=False)
+            simulator = simulators[piece.recording]
             grid = simulate_piece(simulator, piece, given.get('latency', 0.0))
-            parts.append(_observe(piece, plant, grid, given))
+            parts.append(_observe(piece, simulator.plant, grid, given))
         return np.concatenate(parts) if parts else np.zeros(0)
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """Names of the recordings in their order."""
+        return tuple(dict.fromkeys(piece.recording for piece in self.pieces))
+
+    def plant_in(self, plant: Plant, recording: str) -> Plant:
+        """Return a plant as it is in one of the recordings."""
+        if plant.onset is None or plant.onset.recording not in self.recordings:
+            return plant
+        names = self.recordings
+        return plant.in_recording(recording, names[:names.index(plant.onset.recording)])
 
     def subset(self, keep: Sequence[bool]) -> Observations:
         """Return the observations of some of the pieces."""

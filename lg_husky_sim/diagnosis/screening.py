@@ -1,0 +1,382 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Look at every candidate once: the signature it leaves, and how much of the residual it explains.
+
+A signature is the change of all predictions when the effect is put into the fitted model, one
+column for each parameter or for each size. After whitening, and after everything has been
+projected out that a recalibration could explain, the drop of the half sum of squares that a
+signature achieves is its score in nats. An effect that begins at a time or a place leaves the
+same signature after it and none before, since the memory of the channels is short.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lg_husky_sim.diagnosis.candidates import Candidate, effect_entries, neutral
+from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.husky.effects import Onset, OnsetKind
+from lg_husky_sim.husky.model import Structure, compile_model
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.identification.noise import Metric
+from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.signals import FloatArray
+
+#: Time between two moments at which an onset is tried [s].
+ONSET_STEP = 1.5
+#: Data that must lie on either side of an onset [s].
+ONSET_MARGIN = 3.0
+#: Places at which an onset is tried.
+PLACES = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """
+    What a candidate changes.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    start : mapping of str to float
+        Size at which the columns were taken.
+    columns : numpy.ndarray, shape (n_values, k)
+        Change of the predictions for the whole size.
+    free_sign : bool
+        Whether the columns may be taken with either sign.
+    """
+
+    candidate: Candidate
+    start: Mapping[str, float]
+    columns: FloatArray
+    free_sign: bool
+
+
+@dataclass(frozen=True)
+class Score:
+    """
+    What a signature explains.
+
+    Parameters
+    ----------
+    signature : Signature
+    gain : float
+        Drop of the half sum of squares [nats].
+    size : tuple of float
+        Best multiples of the columns.
+    onset : Onset or None
+    """
+
+    signature: Signature
+    gain: float
+    size: tuple[float, ...]
+    onset: Onset | None = None
+
+
+def signatures_of(candidate: Candidate, structure: Structure, parameters: Parameters,
+                  extra: Mapping[str, float], observations: Observations, base: FloatArray
+                  ) -> list[Signature]:
+    """
+    Simulate a candidate on top of a fitted model.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    structure, parameters, extra
+        The fitted model.
+    observations : Observations
+    base : numpy.ndarray, shape (n_values,)
+        Its prediction.
+
+    Returns
+    -------
+    list of Signature
+        One for each start; empty where the candidate does not fit the structure or blows up.
+    """
+    always = replace(candidate.effect, late=False)
+    try:
+        model = compile_model(replace(structure, onset=None, effects=tuple(
+            replace(e, late=False) for e in structure.effects)).with_effect(always))
+    except LgHuskyError:
+        return []
+    found = []
+    for start in candidate.starts:
+        if candidate.signed:
+            free = list(start)
+            sizes = [{name: start[name] if name == one else neutral(name) for name in free}
+                     for one in free]
+        else:
+            sizes = [dict(start)]
+        columns = []
+        for values in sizes:
+            entries = effect_entries(always, values)
+            try:
+                plant = model.at(parameters.with_entries(*entries))
+            except LgHuskyError:
+                continue
+            change = observations.predict(plant, extra) - base
+            if np.all(np.isfinite(change)) and np.max(np.abs(change), initial=0.0) < 1e4:
+                columns.append(change)
+        if columns and len(columns) == len(sizes):
+            found.append(Signature(candidate, start, np.column_stack(columns),
+                                   candidate.signed))
+    return found
+
+
+class Projector:
+    """
+    Whitened residual with the recalibration's directions projected out.
+
+    Parameters
+    ----------
+    observations : Observations
+    metric : Metric
+    residual : numpy.ndarray, shape (n_values,)
+    jacobian : numpy.ndarray, shape (n_values, n_unknowns)
+        Of the recalibration.
+    deviations : numpy.ndarray, shape (n_unknowns,)
+        Standard deviations of the priors (infinite for none): a direction with a tight prior is
+        only projected out as far as the prior allows.
+    pull : numpy.ndarray, shape (n_unknowns,)
+        Centre minus estimate, in deviations: what the priors still ask for.
+    """
+
+    def __init__(self, observations: Observations, metric: Metric, residual: FloatArray,
+                 jacobian: FloatArray, deviations: FloatArray, pull: FloatArray) -> None:
+        self.observations = observations
+        self.metric = metric
+        self.size = residual.size
+        slope = metric.whiten(observations, jacobian)
+        prior = np.diag(1.0 / deviations)
+        self.basis = np.linalg.qr(np.vstack([slope, prior]))[0]
+        self.residual = self._project(np.concatenate(
+            [metric.whiten(observations, residual), pull]))
+
+    def _project(self, rows: FloatArray) -> FloatArray:
+        projected: FloatArray = rows - self.basis @ (self.basis.T @ rows)
+        return projected
+
+    def sums(self, columns: FloatArray, groups: NDArray[np.int64], count: int) -> Sums:
+        """
+        Return what :func:`best_gain` needs of columns, separately for groups of values.
+
+        Parameters
+        ----------
+        columns : numpy.ndarray, shape (n_values, k)
+            Not whitened.
+        groups : numpy.ndarray of int64, shape (n_values,)
+            Number of each value's group.
+        count : int
+            How many groups there are.
+
+        Returns
+        -------
+        Sums
+        """
+        white = self.metric.whiten(self.observations, columns)
+        size, k = white.shape
+        onto = np.zeros((count, self.basis.shape[1], k))
+        own = np.zeros((count, k, k))
+        along = np.zeros((count, k))
+        order = np.argsort(groups, kind='stable')
+        edges = np.searchsorted(groups[order], np.arange(count + 1))
+        for g in range(count):
+            rows = order[edges[g]:edges[g + 1]]
+            if rows.size:
+                part = white[rows]
+                onto[g] = self.basis[rows].T @ part
+                own[g] = part.T @ part
+                along[g] = part.T @ self.residual[rows]
+        return Sums(onto, own, along)
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """
+    Products of whitened columns, group by group.
+
+    Parameters
+    ----------
+    onto : numpy.ndarray, shape (n_groups, n_directions, k)
+        With the recalibration's directions.
+    own : numpy.ndarray, shape (n_groups, k, k)
+        With themselves.
+    along : numpy.ndarray, shape (n_groups, k)
+        With the projected residual.
+    """
+
+    onto: FloatArray
+    own: FloatArray
+    along: FloatArray
+
+    def gain(self, groups: NDArray[np.bool_] | slice, free_sign: bool
+             ) -> tuple[float, tuple[float, ...]]:
+        """
+        Return what the columns explain when they are on in some groups only.
+
+        Parameters
+        ----------
+        groups : numpy.ndarray of bool, shape (n_groups,), or slice
+        free_sign : bool
+            Whether they may enter with a negative sign.
+
+        Returns
+        -------
+        float
+            Drop of the half sum of squares [nats].
+        tuple of float
+            Best multiples.
+        """
+        onto = self.onto[groups].sum(axis=0)
+        matrix = self.own[groups].sum(axis=0) - onto.T @ onto
+        along = self.along[groups].sum(axis=0)
+        norms = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+        if not np.any(norms > 1e-6):
+            return 0.0, tuple(0.0 for _ in norms)
+        safe = np.where(norms > 1e-6, norms, 1.0)
+        scaled = matrix / np.outer(safe, safe) + 1e-6 * np.eye(norms.size)
+        target = np.where(norms > 1e-6, along / safe, 0.0)
+        best = np.linalg.solve(scaled, target)
+        if not free_sign:
+            best = np.maximum(best, 0.0)
+        gain = float(best @ target - 0.5 * best @ scaled @ best)
+        return gain, tuple(float(b) for b in best / safe)
+
+
+@dataclass(frozen=True, eq=False)
+class Onsets:
+    """
+    Onsets to try, as unions of groups of values.
+
+    Parameters
+    ----------
+    groups : numpy.ndarray of int64, shape (n_values,)
+    count : int
+        Number of groups.
+    onsets : tuple of (Onset, numpy.ndarray of bool, shape (n_groups,))
+        Each with the groups that lie after it.
+    """
+
+    groups: NDArray[np.int64]
+    count: int
+    onsets: tuple[tuple[Onset, NDArray[np.bool_]], ...]
+
+
+def _places(observations: Observations) -> tuple[NDArray[np.int64], FloatArray]:
+    # Recording number and x of every value.
+    owner = np.zeros(observations.times.size, dtype=np.int64)
+    x = np.full(observations.times.size, np.nan)
+    for one in observations.slices:
+        piece = observations.pieces[one.piece]
+        owner[one.first:one.last] = observations.recordings.index(piece.recording)
+        if piece.pose is not None:
+            x[one.first:one.last] = np.interp(observations.times[one.first:one.last],
+                                              piece.pose.times, piece.pose.column('x'))
+    return owner, x
+
+
+def time_onsets(observations: Observations) -> Onsets:
+    """
+    Return onsets in time.
+
+    Parameters
+    ----------
+    observations : Observations
+
+    Returns
+    -------
+    Onsets
+        In each recording (later recordings lie after it), and at the same time in all of them.
+    """
+    owner, _ = _places(observations)
+    times = observations.times
+    cells = np.maximum(0, np.floor(times / ONSET_STEP).astype(np.int64))
+    width = int(cells.max(initial=0)) + 1
+    names = observations.recordings
+    number = np.repeat(np.arange(len(names)), width)
+    begins = np.tile(np.arange(width) * ONSET_STEP, len(names))
+    found: list[tuple[Onset, NDArray[np.bool_]]] = []
+    ends = [times[owner == i].max() for i in range(len(names))]
+    for i, name in enumerate(names):
+        for moment in begins[:width]:
+            if ONSET_MARGIN <= moment <= ends[i] - ONSET_MARGIN or (i > 0 and moment == 0.0):
+                found.append((Onset(OnsetKind.TIME, float(moment), name),
+                              (number > i) | ((number == i) & (begins >= moment))))
+    if len(names) > 1:
+        for moment in begins[:width]:
+            if ONSET_MARGIN <= moment <= min(ends) - ONSET_MARGIN:
+                found.append((Onset(OnsetKind.TIME, float(moment)), begins >= moment))
+    return Onsets(owner * width + cells, width * len(names), tuple(found))
+
+
+def place_onsets(observations: Observations) -> Onsets:
+    """
+    Return onsets along x, from above and from below.
+
+    Parameters
+    ----------
+    observations : Observations
+
+    Returns
+    -------
+    Onsets
+        Empty where there is no pose, or it does not move by a metre.
+    """
+    _, x = _places(observations)
+    known = x[np.isfinite(x)]
+    edges = np.linspace(*np.quantile(known, [0.1, 0.9]), PLACES) if known.size else np.zeros(0)
+    if edges.size == 0 or edges[-1] - edges[0] < 1.0:
+        return Onsets(np.zeros(x.size, dtype=np.int64), 1, ())
+    groups = np.where(np.isfinite(x), np.searchsorted(edges, x, side='right'), PLACES + 1)
+    found: list[tuple[Onset, NDArray[np.bool_]]] = []
+    cells = np.arange(PLACES + 2)
+    for i, edge in enumerate(edges):
+        above = (cells >= i + 1) & (cells <= PLACES)
+        found.append((Onset(OnsetKind.PLACE_ABOVE, float(edge)), above))
+        found.append((Onset(OnsetKind.PLACE_BELOW, float(edge)), cells <= i))
+    return Onsets(groups, PLACES + 2, tuple(found))
+
+
+def scan(projector: Projector, signatures: Sequence[Signature],
+         onsets: Sequence[Onsets] = ()) -> list[Score]:
+    """
+    Score signatures, without and with onsets.
+
+    Parameters
+    ----------
+    projector : Projector
+    signatures : sequence of Signature
+    onsets : sequence of Onsets
+        Empty to try none.
+
+    Returns
+    -------
+    list of Score
+        The best of each candidate without, and the best with an onset; highest gain first.
+    """
+    best: dict[tuple[str, bool], Score] = {}
+
+    def offer(score: Score) -> None:
+        key = (score.signature.candidate.label, score.onset is not None)
+        if key not in best or score.gain > best[key].gain:
+            best[key] = score
+
+    whole = np.zeros(projector.size, dtype=np.int64)
+    for signature in signatures:
+        if not signature.candidate.effect.kind.needs_onset:
+            sums = projector.sums(signature.columns, whole, 1)
+            gain, size = sums.gain(slice(None), signature.free_sign)
+            offer(Score(signature, gain, size))
+        for family in onsets:
+            if not family.onsets:
+                continue
+            sums = projector.sums(signature.columns, family.groups, family.count)
+            for onset, groups in family.onsets:
+                gain, size = sums.gain(groups, signature.free_sign)
+                offer(Score(signature, gain, size, onset))
+    return sorted(best.values(), key=lambda s: -s.gain)

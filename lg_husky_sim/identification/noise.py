@@ -1,0 +1,160 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How far a residual may be off: scale of each value and its correlation in time.
+
+The scale of a value has two parts: the channel's own noise, and the slope of the signal times an
+uncertainty of its stamp, since a late stamp on a jump is no physics. The correlation is an
+autoregression for each channel; applied as a filter it makes the residual white, so that a sum of
+squares is a log-likelihood (in half nats).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.signals import FloatArray
+
+#: Uncertainty of a stamp [s].
+STAMP = 0.004
+#: Order of the autoregression.
+ORDER = 8
+#: Smallest noise that is believed [unit of each channel]: below it a channel is taken as exact.
+LEAST = {'wheel_left': 0.004, 'wheel_right': 0.004, 'yaw_rate': 0.001, 'advance': 0.002,
+         'turn': 0.001}
+#: A pose increment further off than this many robust deviations is a jump of the localisation.
+JUMP = 9.0
+
+
+@dataclass(frozen=True, eq=False)
+class Metric:
+    """
+    Scale and correlation of the measurement vector.
+
+    Parameters
+    ----------
+    scale : numpy.ndarray, shape (n_values,)
+        One over the standard deviation; zero for values that are left out.
+    filters : mapping of str to numpy.ndarray
+        For each channel the taps [1, -a1, ...] divided by the innovations' deviation.
+    """
+
+    scale: FloatArray
+    filters: Mapping[str, FloatArray]
+
+    def whiten(self, observations: Observations, values: FloatArray) -> FloatArray:
+        """
+        Return values scaled and filtered, shape as given: (n_values,) or (n_values, k).
+
+        Parameters
+        ----------
+        observations : Observations
+        values : numpy.ndarray
+            Residuals, or columns of derivatives.
+        """
+        scaled = values * (self.scale if values.ndim == 1 else self.scale[:, None])
+        white = np.empty_like(scaled)
+        for one in observations.slices:
+            part, taps = scaled[one.first:one.last], self.filters[one.channel]
+            filtered = white[one.first:one.last]
+            np.multiply(part, taps[0], out=filtered)
+            for lag in range(1, min(taps.size, part.shape[0])):
+                filtered[lag:] += taps[lag] * part[:-lag]
+        return white
+
+
+def spread(values: FloatArray) -> float:
+    """Return a robust standard deviation: 1.4826 times the median absolute deviation."""
+    if values.size == 0:
+        return 0.0
+    return float(1.4826 * np.median(np.abs(values - np.median(values))))
+
+
+def scales(observations: Observations, residual: FloatArray, predicted: FloatArray
+           ) -> FloatArray:
+    """
+    Return one over the standard deviation of every value.
+
+    Parameters
+    ----------
+    observations : Observations
+    residual, predicted : numpy.ndarray, shape (n_values,)
+        Of a fit.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n_values,)
+    """
+    scale = np.zeros(residual.size)
+    for name in observations.channels:
+        slices = [s for s in observations.slices if s.channel == name]
+        steps = np.concatenate([np.diff(residual[s.first:s.last]) for s in slices])
+        level = max(spread(steps) / np.sqrt(2.0), LEAST[name])
+        whole = np.concatenate([residual[s.first:s.last] for s in slices])
+        wide = spread(whole)
+        for s in slices:
+            part = slice(s.first, s.last)
+            times = observations.times[part]
+            slope = np.abs(np.gradient(predicted[part], np.maximum(times, times[0])
+                                       + 1e-9 * np.arange(times.size)))
+            slope = np.maximum(slope, np.maximum(np.roll(slope, 1), np.roll(slope, -1)))
+            scale[part] = 1.0 / np.sqrt(level ** 2 + (slope * STAMP) ** 2)
+            if name in ('advance', 'turn'):
+                off = np.abs(residual[part] - np.median(whole)) > JUMP * max(wide, level)
+                scale[part][off] = 0.0
+    return scale
+
+
+def metric(observations: Observations, residual: FloatArray, scale: FloatArray,
+           order: int = ORDER) -> Metric:
+    """
+    Estimate the correlation of a residual.
+
+    Parameters
+    ----------
+    observations : Observations
+    residual : numpy.ndarray, shape (n_values,)
+        With everything projected out that could be physics, so that none of it passes for noise.
+    scale : numpy.ndarray, shape (n_values,)
+        As :func:`scales` gives it.
+    order : int
+        Of the autoregression.
+
+    Returns
+    -------
+    Metric
+    """
+    filters = {}
+    for name in observations.channels:
+        parts = [(residual * scale)[s.first:s.last] for s in observations.slices
+                 if s.channel == name]
+        filters[name] = _taps(parts, order)
+    return Metric(scale, filters)
+
+
+def _taps(parts: list[FloatArray], order: int) -> FloatArray:
+    # Yule-Walker on values clipped at four deviations, pooled over the pieces.
+    deviation = max(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))), 1e-12)
+    robust = max(spread(np.concatenate(parts)), 0.2 * deviation)
+    clipped = [np.clip(part, -4.0 * robust, 4.0 * robust) for part in parts]
+    longest = max(part.size for part in clipped)
+    order = max(0, min(order, longest // 10))
+    total = sum(part.size for part in clipped)
+    covariance = np.array([
+        sum(float(part[lag:] @ part[:part.size - lag]) for part in clipped if part.size > lag)
+        for lag in range(order + 1)]) / total
+    covariance[0] = covariance[0] * (1.0 + 1e-6) + 1e-12
+    index = np.abs(np.subtract.outer(np.arange(order), np.arange(order)))
+    taps = np.concatenate([[1.0], -np.linalg.solve(covariance[index], covariance[1:])]) if (
+        order) else np.ones(1)
+    innovations = np.concatenate([lfilter(taps, [1.0], part) for part in parts])
+    level = max(float(np.sqrt(np.mean(np.clip(
+        innovations, -5.0 * max(spread(innovations), 1e-9),
+        5.0 * max(spread(innovations), 1e-9)) ** 2))), 1e-9)
+    filtered: FloatArray = taps / level
+    return filtered
