@@ -1,0 +1,93 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A model replays its own drive; the state at the start is found again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lg_husky_sim.comparison import channel_errors, initial_state, replay, tracking
+from lg_husky_sim.comparison.models import load_plants, NamedPlant
+from lg_husky_sim.recording import Recording, Segment, segments
+from lg_husky_sim.recording.recording import cut
+from lg_husky_sim.signals import TimeSeries
+import numpy as np
+import pytest
+
+
+def _late(recording: Recording, start: float, *names: str) -> Segment:
+    """Return the recording from a time on, with some streams only."""
+    streams = {name: recording.streams[name] for name in names}
+    end = float(recording.streams['command'].times[-1])
+    return Segment('late', 0, start, end, cut(streams, start, end))
+
+
+@pytest.mark.parametrize('name', ['circle', 's_bend', 'obstacle', 'stop_and_go'])
+def test_a_model_replays_its_own_drive(
+    name: str, paper: NamedPlant, drive: Callable[[str], Recording],
+) -> None:
+    (segment,) = segments(drive(name))
+    prediction = replay(paper.plant, segment)
+    for channel, error in channel_errors(segment, prediction).items():
+        assert error.rmse < 2e-3, channel
+    assert max(tracking(segment, prediction).bounds) < 2e-3
+
+
+@pytest.mark.parametrize('name', ['circle', 's_bend'])
+def test_a_replay_from_the_midst_of_a_drive(
+    name: str, paper: NamedPlant, drive: Callable[[str], Recording],
+) -> None:
+    segment = _late(drive(name), 8.0, 'command', 'wheels', 'imu', 'pose')
+    errors = channel_errors(segment, replay(paper.plant, segment))
+    assert errors['wheel_speed'].rmse < 0.05
+    assert errors['yaw_rate'].rmse < 0.01
+    assert errors['position'].rmse < 0.03
+
+
+def test_the_initial_state_in_motion(
+    paper: NamedPlant, drive: Callable[[str], Recording],
+) -> None:
+    recording = drive('circle')
+    segment = _late(recording, 12.0, 'command', 'wheels', 'wheel_angles', 'imu', 'pose')
+    state = initial_state(segment, paper.plant)
+    pose = recording.streams['pose'].slice(12.0, 12.0).values[0]
+    assert (state.pose.x, state.pose.y, state.pose.heading) == pytest.approx(pose, abs=0.005)
+    assert state.twist.forward == pytest.approx(0.507, abs=0.002)  # steady: 1.01401 · 0.5 m/s
+    assert state.twist.yaw == pytest.approx(0.403, abs=0.002)  # 1.00759 · 0.4 rad/s
+    wheels = recording.streams['wheels'].slice(12.0, 12.0).values[0]
+    assert state.wheel_rates == pytest.approx(wheels, abs=0.01)
+    angles = recording.streams['wheel_angles'].slice(12.0, 12.0).values[0]
+    assert state.wheel_angles == pytest.approx(angles, abs=0.01)
+
+
+@pytest.mark.parametrize('names', [('wheels',), ('pose',), ('imu', 'pose')])
+def test_speed_and_yaw_rate_from_few_streams(
+    names: tuple[str, ...], paper: NamedPlant, drive: Callable[[str], Recording],
+) -> None:
+    state = initial_state(_late(drive('circle'), 12.0, 'command', *names), paper.plant)
+    assert state.twist.forward == pytest.approx(0.507, abs=0.01)
+    assert state.twist.yaw == pytest.approx(0.403, abs=0.01)
+    assert (state.wheel_rates is None) == ('wheels' not in names)
+
+
+def test_at_rest_a_noisy_pose_is_averaged(
+    paper: NamedPlant, drive: Callable[[str], Recording],
+) -> None:
+    recording = drive('circle')  # stands for one second
+    random = np.random.default_rng(0)
+    pose = recording.streams['pose']
+    noisy = TimeSeries(pose.times, pose.values + random.normal(0.0, 0.1, pose.values.shape),
+                       pose.names)
+    streams = {**recording.streams, 'pose': noisy}
+    (segment,) = segments(Recording('noisy', '', streams, 0))
+    state = initial_state(segment, paper.plant)
+    assert abs(state.pose.x) < 0.05
+    assert abs(state.pose.y) < 0.05
+    assert (state.twist.forward, state.twist.yaw) == (0.0, 0.0)
+
+
+def test_settings_and_labels(paper: NamedPlant) -> None:
+    (heavier,) = load_plants(settings={'mass': 60.0})
+    assert heavier.label == 'paper'
+    assert heavier.model.parameters['mass'] == 60.0
+    assert paper.model.parameters['mass'] == 48.39
