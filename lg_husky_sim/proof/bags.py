@@ -172,8 +172,9 @@ def read_bag(path: Path) -> dict[str, Vector]:
     Returns
     -------
     dict
-        'joints' (stamp, left, right wheel speed), 'imu' (stamp, yaw rate, accelerations)
-        and 'poses' (stamp, x, y, heading unwrapped), stamps in seconds since the epoch.
+        'commands' (stamp, forward, yaw; may be empty), 'joints' (stamp, left, right wheel
+        speed), 'imu' (stamp, yaw rate, accelerations) and 'poses' (stamp, x, y, heading
+        unwrapped), stamps in seconds since the epoch.
 
     Raises
     ------
@@ -182,6 +183,7 @@ def read_bag(path: Path) -> dict[str, Vector]:
 
     """
     from rosbags.rosbag2 import Reader
+    commands: list[list[float]] = []
     joints: list[list[float]] = []
     imu: list[list[float]] = []
     poses: list[list[float]] = []
@@ -189,7 +191,11 @@ def read_bag(path: Path) -> dict[str, Vector]:
         with Reader(path) as reader:
             for connection, time, raw in reader.messages():
                 message: Any
-                if connection.topic == '/joint_states':
+                if connection.topic == COMMAND:
+                    message = _store().deserialize_cdr(raw, connection.msgtype)
+                    twist = getattr(message, 'twist', message)
+                    commands.append([time, twist.linear.x, twist.angular.z])
+                elif connection.topic == '/joint_states':
                     message = _store().deserialize_cdr(raw, connection.msgtype)
                     sides = [np.mean([s for n, s in zip(message.name, message.velocity,
                                                         strict=True)
@@ -213,9 +219,11 @@ def read_bag(path: Path) -> dict[str, Vector]:
     if not (joints and imu and poses):
         raise RecordingError(f'{path} lacks /joint_states, /imu_um7/data or /tf')
     result = {}
-    for name, rows in (('joints', joints), ('imu', imu), ('poses', poses)):
-        table = np.array(rows, dtype=np.float64)
-        table[:, 0] *= 1e-9
-        result[name] = table[np.argsort(table[:, 0], kind='stable')]
+    for name, rows in (('commands', commands), ('joints', joints), ('imu', imu), ('poses', poses)):
+        table = np.array(rows, dtype=np.float64).reshape(len(rows), -1)
+        if rows:
+            table[:, 0] *= 1e-9
+            table = table[np.argsort(table[:, 0], kind='stable')]
+        result[name] = table
     result['poses'][:, 3] = np.unwrap(result['poses'][:, 3])
     return result

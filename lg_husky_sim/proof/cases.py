@@ -13,7 +13,7 @@ from typing import Any
 
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.proof import catalogue, effects, manoeuvres, robots, sensors, world
-from lg_husky_sim.proof.bags import Published, write_bag
+from lg_husky_sim.proof.bags import write_bag
 from lg_husky_sim.proof.engine import integrate_engine
 from lg_husky_sim.proof.integrate import COLUMNS, Gate, integrate, ROUGH_PERIOD
 from lg_husky_sim.proof.sealing import seal
@@ -342,7 +342,7 @@ def generate(spec: Spec, name: str, out_dir: Path, answers_dir: Path,
         senses = replace(hidden.senses, since=-1.0)
         write_bag(held_out_dir / name / f'held{index + 1}',
                   sensors.publish(table, drive, senses, rng), clock * 10 ** 9)
-        truth = ideal(hidden, drive, poses[0], rng)
+        truth = sensors.ideal(run(hidden, drive, poses[0], None, None), drive, senses)
         write_bag(held_out_dir / name / f'truth{index + 1}', truth, clock * 10 ** 9)
         clock += int(drive.duration) + 15
     salt = hashlib.sha256(rng.bytes(32)).hexdigest()
@@ -359,24 +359,15 @@ def generate(spec: Spec, name: str, out_dir: Path, answers_dir: Path,
         'command_path': asdict(hidden.command), 'senses': asdict(hidden.senses),
         'floor': asdict(robot.floor), 'manoeuvres': [drive.name for drive in drives],
     }
-    return seal(answers_dir / f'{name}.json', _plain(answer))
+    return seal(answers_dir / f'{name}.json', plain(answer))
 
 
-def ideal(hidden: Hidden, drive: manoeuvres.Manoeuvre, pose: Pose,
-          rng: np.random.Generator) -> Published:
-    """Return what noiseless sensors of the hidden robot would publish (faults included)."""
-    quiet = replace(hidden.senses, tick=1e-7, stamp_jitter=0.0, gyro_noise=0.0,
-                    accel_noise=0.0, accel_bias=0.0, pose_noise=0.0, heading_noise=0.0,
-                    nuisance_bias=0.0, gaps=(), since=-1.0)
-    return sensors.publish(run(hidden, drive, pose, None, None), drive, quiet, rng)
-
-
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return JSON's own types, with infinities as text."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value

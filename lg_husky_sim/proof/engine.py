@@ -1,7 +1,7 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The Husky in a rigid-body engine: MuJoCo, four cylinders with dry contact on a plane.
+The Husky in a rigid-body engine: MuJoCo, four ellipsoid tyres with dry contact on a plane.
 
 Nothing of the paper's model is in it: no creep, no yaw damping. Sliding, load transfer
 and chatter come from the contact solver. Sizes and masses are Clearpath's public ones.
@@ -12,13 +12,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lg_husky_sim.errors import MissingExtraError
 from lg_husky_sim.proof import world as w
 from lg_husky_sim.proof.dynamics import chopper
 from lg_husky_sim.proof.integrate import COLUMNS, Gate, ROUGH_PERIOD, STEP
+import numpy as np
+from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 
@@ -49,21 +48,23 @@ def _model_text(p: Vector) -> str:
       <body name="{name}" pos="{x} {y} 0">
         <joint name="{name}" type="hinge" axis="0 1 0" armature="{0.5 * p[w.INERTIA_MOTOR]}"
                frictionloss="{friction}" damping="{viscous}"/>
-        <geom name="{name}" type="cylinder" size="{radius} {0.5 * _WHEEL_WIDTH}"
+        <geom name="{name}" type="ellipsoid" size="{radius} {radius} {0.5 * _WHEEL_WIDTH}"
               zaxis="0 1 0" mass="{_WHEEL_MASS}"/>
       </body>""")
+    text = ''.join(wheels)
     height = max(p[w.RADIUS_LEFT], p[w.RADIUS_RIGHT])
     return f"""
 <mujoco model="hidden_robot">
-  <option timestep="{PERIOD}" integrator="implicitfast" cone="elliptic" impratio="5"/>
-  <default><geom friction="{p[w.TYRE_FRICTION]} 0.01 0.002" condim="6"
-    solref="0.01 1" solimp="0.9 0.95 0.002"/></default>
+  <option timestep="{PERIOD}" integrator="implicitfast" cone="elliptic" impratio="1"/>
+  <default><geom friction="{p[w.TYRE_FRICTION]} 0.01 0.002" condim="3"
+    solref="0.045 1" solimp="0.7 0.95 0.005"/></default>
   <worldbody>
     <geom name="floor" type="plane" size="100 100 1"/>
     <body name="base" pos="0 0 {height}">
       <freejoint name="base"/>
       <inertial pos="{p[w.CENTRE_FORWARD]} 0 0.06" mass="{body_mass}"
-                diaginertia="{0.4 * yaw_inertia} {0.8 * yaw_inertia} {yaw_inertia}"/>{''.join(wheels)}
+                diaginertia="{0.4 * yaw_inertia} {0.8 * yaw_inertia} {yaw_inertia}"/>
+      {text}
     </body>
   </worldbody>
   <equality>

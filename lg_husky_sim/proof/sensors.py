@@ -221,6 +221,34 @@ def publish(table: Vector, drive: Manoeuvre, senses: Senses,
     return Published(commands, joints, imu, poses[seen], senses.stamped, senses.suffix)
 
 
+def ideal(table: Vector, drive: Manoeuvre, senses: Senses, rate: float = 200.0) -> Published:
+    """
+    Return what noiseless sensors would publish at `rate` [Hz]; their faults stay.
+
+    It is the yardstick for held-out data: the hidden robot itself, without chance.
+    """
+    times = np.arange(0.02, float(table[-1, 0]), 1.0 / rate)
+    late = {name: senses.late_by if senses.late == name else 0.0
+            for name in ('wheels', 'imu', 'pose')}
+    columns = []
+    for side, factor in (('left', senses.encoder_left), ('right', senses.encoder_right)):
+        angle = _at(table, f'angle_{side}', times) * factor
+        before = _at(table, f'angle_{side}', times - 0.02) * factor
+        columns.append((angle, (angle - before) / 0.02))
+    (left, left_speed), (right, right_speed) = columns
+    gyro = _mean_before(table, 'yaw_rate', times, 0.01) * senses.gyro_factor + senses.gyro_bias
+    if senses.gyro_clip > 0.0:
+        gyro = np.clip(gyro, -senses.gyro_clip, senses.gyro_clip)
+    joints = np.column_stack([times + late['wheels'], left, right, left, right,
+                              left_speed, right_speed, left_speed, right_speed])
+    imu = np.column_stack([times + late['imu'], gyro,
+                           _mean_before(table, 'accel_x', times, 0.01),
+                           _mean_before(table, 'accel_y', times, 0.01)])
+    poses = np.column_stack([times + late['pose'], _at(table, 'x', times),
+                             _at(table, 'y', times), _at(table, 'heading', times)])
+    return Published(np.column_stack([drive.times, drive.commands]), joints, imu, poses)
+
+
 def _stamps(times: Vector, senses: Senses, stream: str, rng: np.random.Generator) -> Vector:
     late = senses.late_by if senses.late == stream else 0.0
     stamps = times + rng.standard_normal(times.size) * senses.stamp_jitter

@@ -1,0 +1,237 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Run a blind trial: generate and seal, diagnose by the command line, open and score."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import as_completed, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+import json
+import multiprocessing
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+import time
+from typing import Any
+
+from lg_husky_sim.errors import CommandError, LgHuskyError
+from lg_husky_sim.proof import bags, measures, plain
+from lg_husky_sim.proof.cases import generate, Spec
+from lg_husky_sim.proof.scoring import judge, Judgement
+from lg_husky_sim.proof.sealing import unseal, write_json
+
+TIME_LIMIT = 900.0
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Folders:
+    """Where a trial keeps its parts; a diagnosis is given paths below `cases` only."""
+
+    root: Path
+
+    @property
+    def cases(self) -> Path:
+        """Recordings, one folder a case."""
+        return self.root / 'cases'
+
+    @property
+    def answers(self) -> Path:
+        """Sealed answers."""
+        return self.root / 'answers'
+
+    @property
+    def held_out(self) -> Path:
+        """Recordings that no diagnosis is given."""
+        return self.root / 'held_out'
+
+    @property
+    def runs(self) -> Path:
+        """What the diagnoses wrote."""
+        return self.root / 'runs'
+
+    @property
+    def commitments(self) -> Path:
+        """Commitments to the answers."""
+        return self.root / 'commitments.json'
+
+
+def name_of(index: int) -> str:
+    """Return the name of case number `index`, counted from zero."""
+    return f'case_{index + 1:04d}'
+
+
+def keep_plan(folders: Folders, specs: Sequence[Spec]) -> None:
+    """
+    Write the plan, or check that the folder holds this very trial (so that it resumes).
+
+    Raises
+    ------
+    CommandError
+        The folder holds another trial.
+
+    """
+    path = folders.root / 'plan.json'
+    plan = json.loads(json.dumps([asdict(spec) for spec in specs]))
+    if path.exists():
+        if json.loads(path.read_text()) != plan:
+            raise CommandError(f'{folders.root} holds another trial; choose an empty folder')
+        return
+    write_json(path, plan)
+
+
+def _generate(spec: Spec, name: str, folders: Folders) -> tuple[str, str]:
+    return name, generate(spec, name, folders.cases, folders.answers, folders.held_out)
+
+
+def prepare(folders: Folders, specs: Sequence[Spec], jobs: int,
+            done: Progress) -> dict[str, str]:
+    """
+    Generate and seal all cases that are not there yet; return the commitments by case.
+
+    The cases of one trial are all sealed before the first is diagnosed.
+    """
+    sealed: dict[str, str] = {}
+    if folders.commitments.exists():
+        sealed = json.loads(folders.commitments.read_text())
+    missing = [(spec, name_of(k)) for k, spec in enumerate(specs)
+               if name_of(k) not in sealed]
+    for _ in range(len(specs) - len(missing)):
+        done('')
+    if not missing:
+        return sealed
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context('spawn'))
+    try:
+        waiting = [pool.submit(_generate, spec, name, folders) for spec, name in missing]
+        for future in as_completed(waiting):
+            name, commitment = future.result()
+            sealed[name] = commitment
+            write_json(folders.commitments, sealed)
+            done(name)
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+    return sealed
+
+
+def command_for(folders: Folders, name: str, out: Path) -> list[str]:
+    """Return the command line that diagnoses one case; it names recordings and nothing else."""
+    case = folders.cases / name
+    command = [sys.executable, '-m', 'lg_husky_sim.cli.main', 'diagnose',
+               *(str(path) for path in sorted((case / 'recordings').iterdir())),
+               '--out', str(out), '--seed', '0', '--jobs', '1']
+    if (case / 'baseline').exists():
+        for path in sorted((case / 'baseline').iterdir()):
+            command += ['--baseline', str(path)]
+    return command
+
+
+def _run(command: list[str]) -> tuple[int, str]:
+    """Run a command; return its exit code and the last line of its standard error."""
+    try:
+        done = subprocess.run(  # noqa: S603 (our own command line)
+            command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
+    except subprocess.TimeoutExpired:
+        return -1, f'no answer within {TIME_LIMIT:.0f} s'
+    lines = done.stderr.strip().splitlines()
+    return done.returncode, lines[-1] if lines else ''
+
+
+def diagnose(folders: Folders, name: str) -> dict[str, Any]:
+    """
+    Diagnose one case blindly, drive its model on held-out commands, and measure.
+
+    Returns
+    -------
+    dict
+        'case', 'exit_code', 'error' (one line or ''), 'seconds', 'diagnosis' (the file's content
+        or None) and 'held_out': for each held-out recording the errors of the 'plain'
+        refitted paper model, the 'augmented' model and the 'truth' (`measures.errors`).
+
+    """
+    out = folders.runs / name
+    path = out / 'outcome.json'
+    if path.exists():
+        outcome: dict[str, Any] = json.loads(path.read_text())
+        return outcome
+    out.mkdir(parents=True, exist_ok=True)
+    work = out / 'diagnosis'
+    if work.exists():
+        shutil.rmtree(work)
+    start = time.monotonic()
+    code, error = _run(command_for(folders, name, work))
+    seconds = time.monotonic() - start
+    diagnosis = None
+    if code == 0:
+        try:
+            diagnosis = json.loads((work / 'diagnosis.json').read_text())
+            error = ''
+        except (OSError, ValueError) as problem:
+            error = f'diagnosis.json cannot be read: {problem}'
+    outcome = {'case': name, 'exit_code': code, 'error': error, 'seconds': seconds,
+               'diagnosis': diagnosis, 'held_out': []}
+    if diagnosis is not None:
+        outcome['held_out'], problem_line = _hold_out(folders, name, work / 'model.yaml')
+        outcome['held_out_error'] = problem_line
+    write_json(path, outcome)
+    return outcome
+
+
+def _hold_out(folders: Folders, name: str, model: Path) -> tuple[list[Any], str]:
+    """Return the errors on each held-out recording, and why there are none."""
+    train = [bags.read_bag(path)
+             for path in sorted((folders.cases / name / 'recordings').iterdir())]
+    parameters = plain.calibrate(train)
+    rows = []
+    for held in sorted((folders.held_out / name).glob('held*')):
+        driven = folders.runs / name / f'{held.name}_model'
+        code, error = _run([sys.executable, '-m', 'lg_husky_sim.cli.main', 'simulate',
+                            '--model', str(model), '--commands', str(held),
+                            '--out', str(driven), '--overwrite'])
+        if code != 0:
+            return [], f'simulate: {error}'
+        measured = bags.read_bag(held)
+        truth = bags.read_bag(held.with_name(held.name.replace('held', 'truth')))
+        rows.append({
+            'recording': held.name,
+            'plain': measures.errors(plain.simulate(parameters, measured), measured),
+            'augmented': measures.errors(bags.read_bag(driven), measured),
+            'truth': measures.errors(truth, measured)})
+        shutil.rmtree(driven)
+    return rows, ''
+
+
+def diagnose_all(folders: Folders, names: Sequence[str], jobs: int) -> Iterator[dict[str, Any]]:
+    """Diagnose cases on `jobs` cores at once; yield outcomes as they come."""
+    pool = ThreadPoolExecutor(jobs)
+    waiting: list[Future[dict[str, Any]]] = []
+    try:
+        waiting = [pool.submit(diagnose, folders, name) for name in names]
+        for future in as_completed(waiting):
+            yield future.result()
+    finally:
+        for future in waiting:
+            future.cancel()
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def open_and_judge(folders: Folders, sealed: dict[str, str],
+                   names: Sequence[str]) -> tuple[Judgement, ...]:
+    """
+    Open the answers, check each against its commitment, and judge.
+
+    Raises
+    ------
+    LgHuskyError
+        An answer was changed, or a case has no outcome yet.
+
+    """
+    result = []
+    for name in names:
+        path = folders.runs / name / 'outcome.json'
+        if not path.exists():
+            raise LgHuskyError(f'{name} has no outcome yet')
+        answer = unseal(folders.answers / f'{name}.json', sealed[name])
+        result.append(judge(answer, json.loads(path.read_text())))
+    return tuple(result)
