@@ -30,6 +30,7 @@ def check_graph(graph: LinearGraph) -> None:
     _check_masses(graph)
     _check_across_loops(graph)
     _check_through_cuts(graph)
+    _check_open_ends(graph)
     _check_characteristics(graph)
 
 
@@ -133,6 +134,21 @@ def _check_through_cuts(graph: LinearGraph) -> None:
                     f'through sources {", ".join(cut)} alone connect node {node[1]!r}, so they '
                     'may contradict each other and its across variable is open; put another '
                     'element in parallel')
+
+
+def _check_open_ends(graph: LinearGraph) -> None:
+    """Refuse nodes with one branch, unless it is an A-type at rest or a source of a signal."""
+    at_node: dict[Node, list[Edge]] = {}
+    for edge in graph.edges:
+        for node in (edge.tail, edge.head):
+            at_node.setdefault(node, []).append(edge)
+    for node, edges in at_node.items():
+        owner = edges[0].owner
+        if len(edges) > 1 or node == graph.ground_of(node[0]) or (
+                isinstance(owner, Branch) and owner.kind in (Kind.A_TYPE, Kind.ACROSS_SOURCE)):
+            continue
+        raise GraphError(f'node {node[1]!r} has no branch but {edges[0].name!r}, so nothing can '
+                         'flow through it; correct the node, or connect another element')
 
 
 def _check_characteristics(graph: LinearGraph) -> None:

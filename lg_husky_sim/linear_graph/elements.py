@@ -51,13 +51,18 @@ _SYMBOLS = {
 class Kind(Enum):
     """What an element is in the theory's words."""
 
-    ACROSS_SOURCE = 'across_source'
-    THROUGH_SOURCE = 'through_source'
-    A_TYPE = 'A_type'
-    T_TYPE = 'T_type'
-    D_TYPE = 'D_type'
+    ACROSS_SOURCE = 'across source'
+    THROUGH_SOURCE = 'through source'
+    A_TYPE = 'A-type'
+    T_TYPE = 'T-type'
+    D_TYPE = 'D-type'
     TRANSFORMER = 'transformer'
     GYRATOR = 'gyrator'
+
+
+def article(words: str) -> str:
+    """Return the words with their indefinite article."""
+    return f'{"an" if words[0] in "AEIOaeio" else "a"} {words}'
 
 
 SOURCES = (Kind.ACROSS_SOURCE, Kind.THROUGH_SOURCE)
@@ -198,7 +203,7 @@ class Branch:
         """Check the branch by itself."""
         _check_name(self.name, 'branch')
         if self.kind in TWO_PORT_KINDS:
-            raise GraphError(f'branch {self.name!r}: a {self.kind.value} has two ports; '
+            raise GraphError(f'branch {self.name!r}: {article(self.kind.value)} has two ports; '
                              'make it with TwoPort')
         for node in (self.tail, self.head):
             _check_node(node, self.name)
@@ -208,7 +213,7 @@ class Branch:
         allowed = _FORMS.get(self.kind, ())
         if self.form is not None and self.form not in allowed:
             names = ' or '.join(form.value for form in allowed) or 'no form'
-            raise GraphError(f'branch {self.name!r}: a {self.kind.value} takes {names}, '
+            raise GraphError(f'branch {self.name!r}: {article(self.kind.value)} takes {names}, '
                              f'not {self.form.value}')
         if self.domain is Domain.THERMAL and self.kind is Kind.T_TYPE:
             raise GraphError(f'branch {self.name!r}: the thermal domain has no T-type; '
@@ -218,7 +223,7 @@ class Branch:
     def _check_value(self) -> None:
         if self.characteristic is not None:
             if self.kind not in (*SOURCES, Kind.D_TYPE):
-                raise GraphError(f'branch {self.name!r}: a {self.kind.value} takes no '
+                raise GraphError(f'branch {self.name!r}: {article(self.kind.value)} takes no '
                                  'characteristic; put it on a source or a D-type')
             if self.value:
                 raise GraphError(f'branch {self.name!r} has a value {self.value!r} and a '
@@ -229,8 +234,8 @@ class Branch:
                 raise GraphError(f'source {self.name!r}: input {self.value!r} is no plain name')
             return
         if not isinstance(self.value, str) or not self.value:
-            raise GraphError(f'branch {self.name!r} has no value; a {self.kind.value} needs an '
-                             "expression such as 'R_1'")
+            raise GraphError(f'branch {self.name!r} has no value; {article(self.kind.value)} '
+                             'needs one, such as R_1')
         try:
             parse(self.value)
         except GraphError as error:
@@ -304,7 +309,7 @@ class TwoPort:
         """Check the two-port by itself."""
         _check_name(self.name, 'two-port')
         if self.kind not in TWO_PORT_KINDS:
-            raise GraphError(f'two-port {self.name!r}: a {self.kind.value} has one port; '
+            raise GraphError(f'two-port {self.name!r}: {article(self.kind.value)} has one port; '
                              'make it with Branch')
         for number, (domain, tail, head) in enumerate((self.port1, self.port2), start=1):
             label = f'{self.name}.{number}'

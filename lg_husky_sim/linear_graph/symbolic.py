@@ -134,7 +134,8 @@ def derive(graph: LinearGraph, outputs: Sequence[str] = (), *,
         graph, matrix(rates, 0, n), matrix(rates, n, m), matrix(y, 0, n), matrix(y, n, m),
         matrix(rates, after, m), matrix(y, after, m), matrix(rates, n + m, k), matrix(z, 0, n),
         matrix(z, n, m), matrix(y, n + m, k), matrix(z, n + m, k),
-        structure.names(structure.states), structure.inputs, tuple(v.name for v in structure.outputs),
+        structure.names(structure.states), structure.inputs,
+        tuple(v.name for v in structure.outputs),
         tuple(graph.edges[edge].name for edge in structure.efforts),
         tuple(v.name for v in structure.arguments), structure.tree.dependent)
 

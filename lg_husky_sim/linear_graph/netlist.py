@@ -1,0 +1,365 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Linear graphs as YAML files that a student can write.
+
+One entry an element, by its everyday name::
+
+    name: DC motor
+    parameters:
+      k_t: 0.05 N·m/A
+    elements:
+      V_s:   {is: voltage source, from: supply}
+      R:     {is: resistor, from: supply, to: winding, value: 0.5 ohm}
+      L:     {is: inductor, from: winding, to: motor, value: 2 mH}
+      motor: {is: transformer, port 1: {domain: electrical, from: motor},
+              port 2: {domain: rotational, from: shaft}, value: k_t}
+      J:     {is: inertia, from: shaft, value: 1e-3 kg·m²}
+    outputs: [omega(J), i(L)]
+
+``to`` is ground where it is left out. A value is an expression in the parameters, or a number
+with a unit, which then is a parameter of the element's name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+import re
+from typing import Any
+
+from lg_husky_sim.errors import GraphError, ModelFileError
+from lg_husky_sim.linear_graph.elements import (
+    Branch,
+    Characteristic,
+    Domain,
+    Form,
+    Kind,
+    Port,
+    SOURCES,
+    TWO_PORT_KINDS,
+    TwoPort,
+)
+from lg_husky_sim.linear_graph.expressions import is_name, names_in
+from lg_husky_sim.linear_graph.graph import GROUND, LinearGraph, suggestion
+from lg_husky_sim.linear_graph.units import check_units, parse_unit, unit_needed
+
+MAX_BYTES = 1_000_000
+_EVERYDAY: Mapping[Domain, Mapping[str, Kind]] = {
+    Domain.ELECTRICAL: {
+        'voltage source': Kind.ACROSS_SOURCE, 'current source': Kind.THROUGH_SOURCE,
+        'capacitor': Kind.A_TYPE, 'inductor': Kind.T_TYPE, 'resistor': Kind.D_TYPE},
+    Domain.TRANSLATIONAL: {
+        'velocity source': Kind.ACROSS_SOURCE, 'force source': Kind.THROUGH_SOURCE,
+        'mass': Kind.A_TYPE, 'spring': Kind.T_TYPE, 'damper': Kind.D_TYPE},
+    Domain.ROTATIONAL: {
+        'speed source': Kind.ACROSS_SOURCE, 'torque source': Kind.THROUGH_SOURCE,
+        'inertia': Kind.A_TYPE, 'torsion spring': Kind.T_TYPE, 'rotary damper': Kind.D_TYPE},
+    Domain.FLUID: {
+        'pressure source': Kind.ACROSS_SOURCE, 'flow source': Kind.THROUGH_SOURCE,
+        'tank': Kind.A_TYPE, 'inertance': Kind.T_TYPE, 'valve': Kind.D_TYPE},
+    Domain.THERMAL: {
+        'temperature source': Kind.ACROSS_SOURCE, 'heat source': Kind.THROUGH_SOURCE,
+        'heat capacity': Kind.A_TYPE, 'thermal resistance': Kind.D_TYPE}}
+ELEMENTS: Mapping[str, tuple[Kind, Domain]] = {
+    name: (kind, domain) for domain, names in _EVERYDAY.items() for name, kind in names.items()}
+_TOP = {'name', 'about', 'ground', 'parameters', 'elements', 'outputs'}
+_ONE = {'is', 'from', 'to', 'value', 'form', 'law', 'of', 'parameters'}
+_TWO = {'is', 'port 1', 'port 2', 'value', 'law', 'of', 'parameters'}
+_QUANTITY = re.compile(r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*', re.ASCII)
+
+
+@dataclass(frozen=True)
+class Netlist:
+    """
+    A graph with the numbers and outputs of its file.
+
+    Parameters
+    ----------
+    name : str
+        Title.
+    graph : LinearGraph
+        The graph.
+    values : mapping of str to float
+        Parameters that the file gives numbers for, SI.
+    outputs : tuple of str
+        Variables to put out.
+    units : mapping of str to str
+        Units of the parameters, as written.
+    about : str
+        Free text.
+    """
+
+    name: str
+    graph: LinearGraph
+    values: Mapping[str, float]
+    outputs: tuple[str, ...]
+    units: Mapping[str, str] = field(default_factory=dict)
+    about: str = ''
+
+
+def read_netlist(path: str | Path) -> Netlist:
+    """
+    Read a netlist file.
+
+    Parameters
+    ----------
+    path : path-like
+        YAML file of at most 1 MB.
+
+    Returns
+    -------
+    Netlist
+
+    Raises
+    ------
+    ModelFileError
+        If the file is no netlist; the message says which file, which element and what is wrong.
+    OSError
+        If it cannot be read.
+    """
+    path = Path(path)
+    with path.open('rb') as file:
+        data = file.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise ModelFileError(f'{path}: larger than {MAX_BYTES} bytes, so it is no netlist')
+    try:
+        text = data.decode('utf-8')
+    except UnicodeDecodeError as error:
+        raise ModelFileError(f'{path}: is no UTF-8 text') from error
+    return parse_netlist(text, str(path))
+
+
+def parse_netlist(text: str, source: str = 'netlist') -> Netlist:
+    """
+    Read a netlist from a text; see :func:`read_netlist`.
+
+    Parameters
+    ----------
+    text : str
+        YAML.
+    source : str
+        What to call it in messages.
+    """
+    try:
+        return _netlist(_load(text))
+    except (GraphError, ModelFileError) as error:
+        raise ModelFileError(f'{source}: {error}') from error
+
+
+def _load(text: str) -> Any:
+    """Read YAML with safe tags only, without aliases, and with every key once."""
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):
+                raise ModelFileError('YAML aliases (*name) are not allowed; write the text out')
+            return super().compose_node(parent, index)
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict[Hashable, Any]:
+            seen = set()
+            for key, _ in node.value:
+                if key.value.__hash__ is not None and isinstance(key.value, str):
+                    if key.value in seen:
+                        line = key.start_mark.line + 1
+                        raise ModelFileError(f'line {line}: {key.value!r} is there twice')
+                    seen.add(key.value)
+            return super().construct_mapping(node, deep)
+    try:
+        return yaml.load(text, Loader)  # noqa: S506 - Loader is a SafeLoader
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f'line {mark.line + 1}: ' if mark is not None else ''
+        raise ModelFileError(f'{where}{error.problem or error.context}') from error
+    except (yaml.YAMLError, RecursionError, ValueError, OverflowError, TypeError) as error:
+        raise ModelFileError(f'cannot be read as YAML ({type(error).__name__})') from error
+
+
+def _netlist(data: Any) -> Netlist:
+    top = _mapping(data, 'the file', _TOP)
+    parameters = _mapping(top.get('parameters') or {}, 'parameters', None)
+    values: dict[str, float] = {}
+    units: dict[str, str] = {}
+    for name, given in parameters.items():
+        if not is_name(name):
+            raise ModelFileError(f'parameter name {name!r} must be letters, digits and _')
+        if given is None:
+            continue
+        number, unit = _quantity(given, f'parameter {name}')
+        values[name] = number
+        if unit:
+            units[name] = unit
+    elements = _mapping(top.get('elements'), 'elements', None)
+    if not elements:
+        raise ModelFileError('elements is empty; give at least one')
+    branches: list[Branch] = []
+    two_ports: list[TwoPort] = []
+    for name, given in elements.items():
+        try:
+            element = _element(name, given, values, units)
+        except (GraphError, ModelFileError) as error:
+            message = str(error)
+            raise ModelFileError(message if repr(name) in message else
+                                 f'element {name!r}: {message}') from error
+        if isinstance(element, Branch):
+            branches.append(element)
+        else:
+            two_ports.append(element)
+    graph = LinearGraph(tuple(branches), tuple(two_ports), _ground(top.get('ground', GROUND)))
+    check_units(graph, units)
+    outputs = tuple(_texts(top.get('outputs') or [], 'outputs'))
+    for output in outputs:
+        graph.variable(output)
+    used = {name for branch in branches for name in _names(branch)}
+    used |= {name for two_port in two_ports for name in _names(two_port)}
+    for name in parameters:
+        if name not in used:
+            raise ModelFileError(f'parameter {name!r} is used by no element'
+                                 f'{suggestion(name, sorted(used))}')
+    return Netlist(_text(top.get('name', 'graph'), 'name'), graph, values, outputs, units,
+                   _text(top.get('about', ''), 'about'))
+
+
+def _names(element: Branch | TwoPort) -> tuple[str, ...]:
+    if element.characteristic is not None:
+        return element.characteristic.parameters
+    source = isinstance(element, Branch) and element.kind in SOURCES
+    return () if source else names_in(element.value)
+
+
+def _element(name: str, given: Any, values: dict[str, float], units: dict[str, str],
+             ) -> Branch | TwoPort:
+    if not is_name(name):
+        raise ModelFileError(f'element name {name!r} must be letters, digits and _')
+    entry = _mapping(given, f'element {name!r}', None)
+    what = _text(entry.get('is', ''), 'is')
+    two_ports = {kind.value: kind for kind in TWO_PORT_KINDS}
+    if what in two_ports:
+        _known(entry, f'element {name!r}', _TWO)
+        ports = [_port(entry.get(f'port {number}'), f'port {number}') for number in (1, 2)]
+        law = _law(entry)
+        two_port = TwoPort(name, two_ports[what], ports[0], ports[1], '' if law else '1',
+                           characteristic=law)
+        return two_port if law else replace(
+            two_port, value=_value(entry, two_port, values, units))
+    if what not in ELEMENTS:
+        raise ModelFileError(f'is: {what!r} is no element'
+                             f'{suggestion(what, (*ELEMENTS, *two_ports))}')
+    _known(entry, f'element {name!r}', _ONE)
+    kind, domain = ELEMENTS[what]
+    form = None
+    if 'form' in entry:
+        forms = {form.value: form for form in Form}
+        text = _text(entry['form'], 'form')
+        if text not in forms:
+            raise ModelFileError(f'form {text!r} must be one of {", ".join(forms)}')
+        form = forms[text]
+    law = _law(entry)
+    tail, head = _node(entry, 'from', None), _node(entry, 'to', GROUND)
+    if law is not None:
+        return Branch(name, kind, domain, tail, head, form=form, characteristic=law)
+    if kind in SOURCES:
+        return Branch(name, kind, domain, tail, head, _text(entry.get('value', ''), 'value'))
+    branch = Branch(name, kind, domain, tail, head, '1', form)
+    return replace(branch, value=_value(entry, branch, values, units))
+
+
+def _value(entry: Mapping[str, Any], draft: Branch | TwoPort, values: dict[str, float],
+           units: dict[str, str]) -> str:
+    """Return the value's expression; a number becomes a parameter of the element's name."""
+    given = entry.get('value', draft.name)
+    if isinstance(given, str) and not _QUANTITY.fullmatch(given):
+        return given
+    match = _QUANTITY.fullmatch(str(given))
+    if match is not None and isinstance(given, str) and re.match(r'[*/+\-]', match.group(2)):
+        return given    # an expression that begins with a number
+    if draft.name in values:
+        raise ModelFileError(f'{draft.name!r} is a parameter too; write value: {draft.name}, or '
+                             'give the number in one place')
+    values[draft.name], unit = _quantity(given, 'value')
+    units[draft.name] = unit or unit_needed(draft)
+    return draft.name
+
+
+def _quantity(given: Any, what: str) -> tuple[float, str]:
+    """Return a number in SI and its unit; a number without a unit is SI."""
+    if isinstance(given, bool) or not isinstance(given, int | float | str):
+        raise ModelFileError(f"{what} must be a number with a unit, such as '0.5 ohm'")
+    match = _QUANTITY.fullmatch(str(given))
+    if match is None:
+        raise ModelFileError(f'{what} = {given!r} must be a number with a unit, '
+                             "such as '0.5 ohm'")
+    number, unit = float(match.group(1)), match.group(2)
+    scaled = number * parse_unit(unit).scale
+    if not abs(scaled) < 1e300:
+        raise ModelFileError(f'{what} = {given!r} is too large')
+    return scaled, unit
+
+
+def _law(entry: Mapping[str, Any]) -> Characteristic | None:
+    if 'law' not in entry:
+        for key in ('of', 'parameters'):
+            if key in entry:
+                raise ModelFileError(f'{key} needs a law')
+        return None
+    if 'value' in entry:
+        raise ModelFileError('give a value or a law, not both')
+    return Characteristic(_text(entry['law'], 'law'), tuple(_texts(entry.get('of', []), 'of')),
+                          tuple(_texts(entry.get('parameters', []), 'parameters')))
+
+
+def _port(given: Any, what: str) -> Port:
+    entry = _mapping(given, what, {'domain', 'from', 'to'})
+    domains = {domain.value: domain for domain in Domain}
+    text = _text(entry.get('domain', ''), 'domain')
+    if text not in domains:
+        raise ModelFileError(f'{what}: domain {text!r} must be one of {", ".join(domains)}')
+    return domains[text], _node(entry, 'from', None), _node(entry, 'to', GROUND)
+
+
+def _ground(given: Any) -> str | dict[Domain, str]:
+    if isinstance(given, str):
+        return given
+    domains = {domain.value: domain for domain in Domain}
+    entry = _mapping(given, 'ground', set(domains))
+    return {domains[key]: _text(node, 'ground') for key, node in entry.items()}
+
+
+def _node(entry: Mapping[str, Any], key: str, default: str | None) -> str:
+    given = entry.get(key, default)
+    if isinstance(given, int) and not isinstance(given, bool):
+        return str(given)
+    if not isinstance(given, str):
+        raise ModelFileError(f'{key} must name a node')
+    return given
+
+
+def _mapping(given: Any, what: str, known: set[str] | None) -> Mapping[str, Any]:
+    if not isinstance(given, dict):
+        raise ModelFileError(f'{what} must be entries of the form key: value')
+    for key in given:
+        if not isinstance(key, str):
+            raise ModelFileError(f'{what}: key {key!r} must be a text')
+    if known is not None:
+        _known(given, what, known)
+    return given
+
+
+def _known(given: Mapping[str, Any], what: str, known: set[str]) -> None:
+    for key in given:
+        if key not in known:
+            raise ModelFileError(f'{what}: unknown key {key!r}{suggestion(key, sorted(known))}')
+
+
+def _text(given: Any, what: str) -> str:
+    if not isinstance(given, str) or len(given) > 2000:
+        raise ModelFileError(f'{what} must be a short text')
+    return given
+
+
+def _texts(given: Any, what: str) -> list[str]:
+    if not isinstance(given, list):
+        raise ModelFileError(f'{what} must be a list')
+    return [_text(item, what) for item in given]
