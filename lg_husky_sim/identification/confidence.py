@@ -51,6 +51,8 @@ class Confidence:
         Blocks of time that the scatter was summed over.
     low, high : numpy.ndarray, shape (n_unknowns,)
         95 % intervals of the values.
+    inflation : numpy.ndarray, shape (n_unknowns,)
+        Variance over that of white residuals of unit size.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -60,6 +62,7 @@ class Confidence:
     blocks: int
     low: FloatArray
     high: FloatArray
+    inflation: FloatArray
 
     @property
     def deviations(self) -> FloatArray:
@@ -126,7 +129,8 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     low = [u.value(v - r) for u, v, r in zip(solution.unknowns, varied, reach, strict=True)]
     high = [u.value(v + r) for u, v, r in zip(solution.unknowns, varied, reach, strict=True)]
     return Confidence(solution.unknowns, covariance, covariance / np.outer(
-        deviations, deviations), condition, blocks, np.array(low), np.array(high))
+        deviations, deviations), condition, blocks, np.array(low), np.array(high),
+        variances / np.maximum(np.diag(bread), 1e-300))
 
 
 def separators(names: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ from lg_husky_sim.identification.confidence import Confidence, confidence, undet
 from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
 from lg_husky_sim.identification.multistart import best_solution, Ends, refine
 from lg_husky_sim.identification.problem import Observations, observations, UNITS
+from lg_husky_sim.identification.profile import Profile, profile
 from lg_husky_sim.identification.result import (
     ChannelFit,
     Estimated,
@@ -50,8 +51,9 @@ APART = 3.0
 
 def estimate(model: ModelFile, segments: Sequence[Segment], *,
              method: Method = Method.LEAST_SQUARES, free: Sequence[str] = (),
-             nuisance: Sequence[str] = (), seed: int = 0, starts: int = STARTS, jobs: int = 1,
-             scheduler: str | None = None, baseline: ModelFile | None = None,
+             nuisance: Sequence[str] = (), profiles: Sequence[str] = (), seed: int = 0,
+             starts: int = STARTS, jobs: int = 1, scheduler: str | None = None,
+             baseline: ModelFile | None = None,
              progress: Callable[[str], None] | None = None) -> FitResult:
     """
     Estimate parameters.
@@ -70,6 +72,8 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
     nuisance : sequence of str
         Unknowns of the recordings, for least squares: latency, delay_wheels, delay_imu,
         delay_pose [s], gyro_bias [rad/s].
+    profiles : sequence of str
+        Estimated parameters that get a likelihood profile.
     seed : int
         The same seed gives the same estimates to the last bit.
     starts : int
@@ -104,7 +108,7 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
         ends = best_solution(data, model, unknowns, seed, starts, jobs, scheduler, tell)
         problem, solution, evaluations = refine(data, model, unknowns, ends.values, tell)
         return _result(model, baseline or model, segments, method, seed, problem, solution,
-                       ends.evaluations + evaluations, began, ends=ends)
+                       ends.evaluations + evaluations, began, profiles, tell, ends=ends)
     if nuisance:
         raise FitError(f'nuisance {nuisance[0]!r} can only be estimated by least-squares')
     objective = TrackingObjective(compile_model(model.structure), model.parameters, names,
@@ -115,7 +119,7 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
     unknowns = unknowns_of(fitted, names, ())
     problem, solution, evaluations = refine(data, fitted, unknowns, {}, tell, steps=0)
     return _result(model, baseline or model, segments, method, seed, problem, solution,
-                   found.evaluations + evaluations, began, search=found)
+                   found.evaluations + evaluations, began, profiles, tell, search=found)
 
 
 def _search(method: Method, objective: Objective, lower: FloatArray, upper: FloatArray,
@@ -128,8 +132,10 @@ def _search(method: Method, objective: Objective, lower: FloatArray, upper: Floa
 
 def _result(model: ModelFile, baseline: ModelFile, segments: Sequence[Segment], method: Method,
             seed: int, problem: Problem, solution: Solution, evaluations: int, began: float,
+            profiles: Sequence[str], tell: Callable[[str], None],
             ends: Ends | None = None, search: SearchResult | None = None) -> FitResult:
     sure = confidence(problem, solution)
+    drawn = tuple(_profile(problem, solution, sure, name, tell) for name in profiles)
     estimates = tuple(
         _estimated(u, solution.values[u.name], float(low), float(high), model.parameters)
         for u, low, high in zip(solution.unknowns, sure.low, sure.high, strict=True))
@@ -149,7 +155,15 @@ def _result(model: ModelFile, baseline: ModelFile, segments: Sequence[Segment], 
         method, seed, fitted, _recordings(segments), estimates, sure.correlation,
         sure.covariance, sure.condition, cost, evaluations, time.perf_counter() - began,
         channel_fits(problem.observations, segments, baseline, fitted, solution),
-        starts, history, undetermined(sure, values), warnings, converged)
+        starts, history, undetermined(sure, values), warnings, converged, drawn)
+
+
+def _profile(problem: Problem, solution: Solution, sure: Confidence, name: str,
+             tell: Callable[[str], None]) -> Profile:
+    names = [u.name for u in sure.unknowns]
+    place = names.index(name) if name in names else 0
+    return profile(problem, solution, name, float(sure.deviations[place]),
+                   float(sure.inflation[place]), lambda: tell(f'profile of {name}'))
 
 
 def _recordings(segments: Sequence[Segment]) -> tuple[str, ...]:

@@ -74,17 +74,18 @@ def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
 def _dask(function: Callable[[Task], Outcome], tasks: Sequence[Task], scheduler: str,
           tell: Callable[[], None]) -> list[Outcome]:
     try:
-        from distributed import as_completed as completed, Client
+        import distributed
     except ImportError as error:
         raise MissingExtraError('--scheduler needs Dask: pip install "lg_husky_sim[scale]"'
                                 ) from error
     try:
-        client: Any = Client(scheduler, timeout=PATIENCE, set_as_default=False)
+        dask: Any = distributed
+        client = dask.Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise FitError(f'no Dask scheduler answers at {scheduler!r}') from error
     with client:
         futures = client.map(function, tasks, pure=False)
-        for _ in completed(futures):
+        for _ in dask.as_completed(futures):
             tell()
         results: list[Outcome] = client.gather(futures)
         return results

@@ -221,16 +221,17 @@ def refine(data: Observations, model: ModelFile, unknowns: Sequence[Unknown],
     values = {u.name: start.get(u.name, 0.0 if u.extra else model.parameters[u.name])
               for u in unknowns}
     evaluations = 0
-    for number in range(PASSES + 1):
+    passes = 0
+    while True:
         problem = CountedProblem(data, compiled, model.parameters, used, unknowns)
-        solution = solve(problem, values, steps if number else 0, TOLERANCE)
+        solution = solve(problem, values, steps if passes else 0, TOLERANCE)
         evaluations += problem.evaluations
         if solution is None:
             raise FitError('the model cannot be simulated at the values '
                            + ', '.join(f'{n} = {v:g}' for n, v in values.items()))
         tell('noise')
-        if number == PASSES:
-            break
+        if passes == PASSES:
+            return problem, solution, evaluations
+        passes += 1
         values = dict(solution.values)
         used = noise_metric(data, data.measured - solution.predicted, solution.predicted)
-    return problem, solution, evaluations

@@ -7,9 +7,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 import enum
+import math
 from typing import Any
 
 from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.identification.profile import Profile
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -121,6 +123,8 @@ class FitResult:
     undetermined, warnings : tuple of str
         Sentences.
     converged : bool
+    profiles : tuple of Profile
+        Of the parameters that were asked for.
     """
 
     method: Method
@@ -140,6 +144,7 @@ class FitResult:
     undetermined: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     converged: bool = True
+    profiles: tuple[Profile, ...] = ()
 
     @property
     def values(self) -> dict[str, float]:
@@ -171,6 +176,9 @@ class FitResult:
                           f'(condition number {self.condition:.3g}):']
             lines += [f'  {self.estimates[j].name}, {self.estimates[i].name}: '
                       f'{self.correlation[i, j]:+.3f}' for _, i, j in sorted(pairs, reverse=True)]
+        if self.profiles:
+            lines += ['', '95 % intervals by likelihood profile:',
+                      *(f'  {p.name}: {p.low:.5g} to {p.high:.5g}' for p in self.profiles)]
         if self.undetermined:
             lines += ['', 'what these data cannot determine:',
                       *(f'  {text}' for text in self.undetermined)]
@@ -195,5 +203,13 @@ class FitResult:
             'starts': [{'values': dict(s.values), 'cost': s.cost, 'converged': s.converged}
                        for s in self.starts],
             'history': self.history.tolist(),
+            'profiles': [{
+                'name': p.name, 'low': _finite(p.low), 'high': _finite(p.high),
+                'values': p.values.tolist(), 'rise': [_finite(r) for r in p.rise]}
+                for p in self.profiles],
             'undetermined': list(self.undetermined), 'warnings': list(self.warnings),
         }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,165 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What `lg_husky identify` does, as functions: all recordings together, or each on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lg_husky_sim.errors import RecordingError, SettingsError
+from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.identification.estimate import estimate, STARTS
+from lg_husky_sim.identification.executor import run_tasks
+from lg_husky_sim.identification.report import write_fit
+from lg_husky_sim.identification.result import FitResult, Method
+from lg_husky_sim.recording import read_recording, Segment, segments, TopicMap
+
+
+@dataclass(frozen=True)
+class Request:
+    """
+    What is asked of an identification.
+
+    Parameters
+    ----------
+    model : ModelFile
+        To be estimated, effects included.
+    before : ModelFile
+        To stand beside it, as it was given.
+    method : Method
+    free, nuisance, profiles : tuple of str
+    seed, starts : int
+    topics : TopicMap or None
+    """
+
+    model: ModelFile
+    before: ModelFile
+    method: Method = Method.LEAST_SQUARES
+    free: tuple[str, ...] = ()
+    nuisance: tuple[str, ...] = ()
+    profiles: tuple[str, ...] = ()
+    seed: int = 0
+    starts: int = STARTS
+    topics: TopicMap | None = None
+
+
+def read_segments(paths: Sequence[str], topics: TopicMap | None = None) -> list[Segment]:
+    """
+    Return the segments of several recordings.
+
+    Raises
+    ------
+    RecordingError
+        If a recording cannot be read, or two have one name.
+    """
+    found: list[Segment] = []
+    names: dict[str, str] = {}
+    for path in paths:
+        recording = read_recording(path, topics)
+        if recording.name in names:
+            raise RecordingError(f'{path} and {names[recording.name]} are both named '
+                                 f'{recording.name}; rename one')
+        names[recording.name] = path
+        found.extend(segments(recording))
+    return found
+
+
+def _fit(request: Request, parts: Sequence[Segment], jobs: int, scheduler: str | None,
+         tell: Callable[[str], None] | None) -> FitResult:
+    return estimate(request.model, parts, method=request.method, free=request.free,
+                    nuisance=request.nuisance, profiles=request.profiles, seed=request.seed,
+                    starts=request.starts, jobs=jobs, scheduler=scheduler,
+                    baseline=request.before, progress=tell)
+
+
+def fit_together(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
+                 scheduler: str | None = None, tell: Callable[[str], None] | None = None
+                 ) -> tuple[FitResult, tuple[Path, ...]]:
+    """
+    Fit one model to all recordings and write it with its report.
+
+    Parameters
+    ----------
+    request : Request
+    paths : sequence of str
+    out : pathlib.Path
+        Model file.
+    jobs : int
+    scheduler : str, optional
+    tell : callable, optional
+
+    Returns
+    -------
+    FitResult
+    tuple of pathlib.Path
+        The files.
+    """
+    parts = read_segments(paths, request.topics)
+    result = _fit(request, parts, jobs, scheduler, tell)
+    return result, write_fit(result, parts, request.before, out)
+
+
+@dataclass(frozen=True)
+class _Task:
+    request: Request
+    path: str
+
+
+def _fit_one(task: _Task) -> FitResult:
+    parts = read_segments([task.path], task.request.topics)
+    return _fit(task.request, parts, 1, None, None)
+
+
+def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
+             scheduler: str | None = None, tell: Callable[[str], None] | None = None) -> str:
+    """
+    Fit every recording on its own, on processes here or on a cluster.
+
+    Parameters
+    ----------
+    request : Request
+    paths : sequence of str
+        On a cluster, every worker must be able to read them.
+    out : pathlib.Path
+        Folder; gets NAME.yaml, .txt, .json and .html for each recording.
+    jobs : int
+    scheduler : str, optional
+    tell : callable, optional
+
+    Returns
+    -------
+    str
+        A table of the estimates.
+
+    Raises
+    ------
+    SettingsError
+        If ``out`` is a file, or two recordings would share a name.
+    """
+    if out.exists() and not out.is_dir():
+        raise SettingsError(f'{out} is no folder; --each needs one')
+    names = [Path(path).name for path in paths]
+    if len(set(names)) != len(names):
+        raise SettingsError('two recordings have one name; --each writes a file for each')
+    word = tell or (lambda text: None)
+    results = run_tasks(_fit_one, [_Task(request, path) for path in paths], jobs, scheduler,
+                        lambda: word('recording'))
+    for name, path, result in zip(names, paths, results, strict=True):
+        write_fit(result, read_segments([path], request.topics), request.before,
+                  out / f'{name}.yaml')
+    return each_table(names, results)
+
+
+def each_table(names: Sequence[str], results: Sequence[FitResult]) -> str:
+    """Return a table with one row a recording: estimates with half their intervals."""
+    columns = [one.name for one in results[0].estimates]
+    width = max([9, *(len(name) for name in names)])
+    lines = [f'{"recording":<{width}}  ' + '  '.join(f'{c:>22}' for c in columns)]
+    for name, result in zip(names, results, strict=True):
+        cells = [f'{one.value:.5g} ± {0.5 * (one.high - one.low):.2g}'
+                 for one in result.estimates]
+        flag = '' if result.converged and not result.warnings else '  (see its report)'
+        lines.append(f'{name:<{width}}  ' + '  '.join(f'{c:>22}' for c in cells) + flag)
+    return '\n'.join(lines)
