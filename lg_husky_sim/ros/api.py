@@ -15,7 +15,7 @@ from importlib.util import find_spec
 import os
 from typing import Any, TYPE_CHECKING
 
-from lg_husky_sim.errors import MissingExtraError
+from lg_husky_sim.errors import LgHuskyError, MissingExtraError
 
 HAVE_RCLPY = find_spec('rclpy') is not None
 
@@ -34,7 +34,11 @@ if TYPE_CHECKING or not HAVE_RCLPY:
     from lg_husky_sim.ros.embedded.environment import read_discovery
     from lg_husky_sim.ros.embedded.messages import message_class
     from lg_husky_sim.ros.embedded.node import Node, services_work
-    from lg_husky_sim.ros.embedded.parameters import Parameter, ParameterType
+    from lg_husky_sim.ros.embedded.parameters import (
+        Parameter,
+        ParameterException,
+        ParameterType,
+    )
     from lg_husky_sim.ros.embedded.qos import (
         DurabilityPolicy,
         HistoryPolicy,
@@ -45,17 +49,14 @@ if TYPE_CHECKING or not HAVE_RCLPY:
     from lg_husky_sim.ros.embedded.spin import SingleThreadedExecutor, spin, spin_once
     from lg_husky_sim.ros.embedded.time import Duration, Time
 
-    #: Raised where the command line is wrong.
-    ArgumentErrors: tuple[type[Exception], ...] = ()
+    #: What a user's mistake raises; its message is one line.
+    USER_ERRORS: tuple[type[Exception], ...] = (LgHuskyError, ParameterException)
 else:
     from rclpy import init, ok, shutdown, spin, spin_once, try_shutdown
     from rclpy.duration import Duration
-    from rclpy.exceptions import (
-        InvalidNamespaceException,
-        InvalidNodeNameException,
-        InvalidTopicNameException,
-    )
+    from rclpy.exceptions import NameValidationException, ParameterException
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.impl.implementation_singleton import rclpy_implementation
     from rclpy.node import Node
     from rclpy.parameter import Parameter
     from rclpy.qos import (
@@ -67,8 +68,10 @@ else:
     )
     from rclpy.time import Time
     ParameterType = Parameter.Type
-    ArgumentErrors = (
-        InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException)
+    _errors = rclpy_implementation
+    USER_ERRORS = (
+        LgHuskyError, NameValidationException, ParameterException, _errors.RCLError,
+        _errors.UnknownROSArgsError)
 
     def services_work() -> bool:
         """Return True: with rclpy every middleware carries services."""
@@ -134,7 +137,7 @@ def describe_backend(environment: Mapping[str, str] = os.environ) -> str:
 
 __all__ = [
     'HAVE_RCLPY',
-    'ArgumentErrors',
+    'USER_ERRORS',
     'DurabilityPolicy',
     'Duration',
     'ExternalShutdownException',

@@ -1,0 +1,134 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The table of settings as ROS parameters: declared, checked before a change, applied after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.ros.api import message_type, Node, Parameter, parameter_overrides
+from lg_husky_sim.ros.settings import (
+    BY_NAME,
+    check_names,
+    DEFAULT_PRESET,
+    make_settings,
+    preset_values,
+    Setting,
+    Settings,
+    TABLE,
+)
+
+#: Parameters that ROS itself gives to every node.
+_OF_ROS = ('use_sim_time', 'start_type_description_service', 'qos_overrides')
+
+
+def _descriptor(setting: Setting) -> Any:
+    text = setting.text + (f' [{setting.unit}]' if setting.unit else '')
+    descriptor = message_type('rcl_interfaces/msg/ParameterDescriptor')(
+        description=text, additional_constraints=setting.allowed(),
+        read_only=not setting.live)
+    if setting.kind is float:
+        limits = message_type('rcl_interfaces/msg/FloatingPointRange')
+        descriptor.floating_point_range = [
+            limits(from_value=setting.low, to_value=setting.high)]
+    elif setting.kind is int:
+        limits = message_type('rcl_interfaces/msg/IntegerRange')
+        descriptor.integer_range = [
+            limits(from_value=int(setting.low), to_value=int(setting.high))]
+    return descriptor
+
+
+def _plain(value: object) -> object:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def declare_settings(node: Node) -> Settings:
+    """
+    Declare every setting on a node and return their values.
+
+    Whole numbers are taken where decimals are meant (``-p rate:=50``).
+
+    Parameters
+    ----------
+    node : Node
+
+    Returns
+    -------
+    Settings
+
+    Raises
+    ------
+    SettingsError
+        If a given name is unknown, or a value not allowed.
+    """
+    given = {name: parameter.value for name, parameter in parameter_overrides(node).items()
+             if name.split('.')[0] not in _OF_ROS}
+    check_names(given)
+    settings = make_settings(given)
+    for setting in TABLE:
+        value = _plain(getattr(settings, setting.name))
+        node.declare_parameter(setting.name, value, _descriptor(setting), ignore_override=True)
+    return settings
+
+
+def parameter_defaults(preset: str = DEFAULT_PRESET) -> dict[str, object]:
+    """Return all defaults under a preset, as parameter values."""
+    return {name: _plain(value) for name, value in preset_values(preset).items()}
+
+
+class LiveSettings:
+    """
+    Keeps settings and parameters in step while the node runs.
+
+    Parameters
+    ----------
+    node : Node
+    settings : Settings
+    apply : callable
+        Receives new settings; may refuse them with a SettingsError.
+    """
+
+    def __init__(self, node: Node, settings: Settings, apply: Callable[[Settings], None]) -> None:
+        """Watch the node's parameters."""
+        self._settings = settings
+        self._apply = apply
+        self._result = message_type('rcl_interfaces/msg/SetParametersResult')
+        node.add_on_set_parameters_callback(self._check)
+
+    def _check(self, parameters: Sequence[Parameter]) -> Any:
+        changes = {p.name: p.value for p in parameters if p.name in BY_NAME}
+        if not changes:
+            return self._result(successful=True)
+        try:
+            for name in changes:
+                if not BY_NAME[name].live:
+                    raise SettingsError(f'{name} cannot change while the node runs')
+            settings = replace(self._settings, **changes)
+            # Applied here and not after: a model file that cannot be loaded must be refused.
+            self._apply(settings)
+        except SettingsError as error:
+            return self._result(successful=False, reason=str(error))
+        self._settings = settings
+        return self._result(successful=True)
+
+    def changed(self, **values: object) -> Settings:
+        """
+        Change settings from inside, by a topic.
+
+        Raises
+        ------
+        SettingsError
+            If a value is not allowed.
+        """
+        settings = replace(self._settings, **values)  # type: ignore[arg-type]
+        self._apply(settings)
+        self._settings = settings
+        return settings
+
+
+def as_values(settings: Settings) -> dict[str, object]:
+    """Return settings as parameter values."""
+    return {name: _plain(value) for name, value in asdict(settings).items()}

@@ -1,0 +1,78 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The node: translates messages and paces steps; the physics is elsewhere.
+
+``ros2 run lg_husky_sim sim_node`` with ROS 2, ``sim_node`` without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import signal
+import sys
+import time
+from typing import Any, TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+NAME = 'sim_node'
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Run the node until Ctrl-C or SIGTERM.
+
+    Parameters
+    ----------
+    args : sequence of str, optional
+        Command line; ``sys.argv`` if not given.
+
+    Returns
+    -------
+    int
+        0 after a clean end, 1 if arguments, parameters or files are wrong.
+    """
+    # Imports take most of the start; a signal during them ends the process cleanly as well.
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        return _run(args)
+    except KeyboardInterrupt:
+        return 0
+
+
+def _run(args: Sequence[str] | None) -> int:
+    started = time.monotonic()
+    from lg_husky_sim.errors import LgHuskyError
+    try:
+        from lg_husky_sim.ros import api
+    except LgHuskyError as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    node: Any = None
+    code = 0
+    try:
+        api.init(args=list(sys.argv if args is None else args))
+        from lg_husky_sim.ros.simulation_node import SimNode
+        node = SimNode(NAME, started=started)
+        api.spin(node)
+    except (KeyboardInterrupt, api.ExternalShutdownException):
+        code = 0
+    except api.USER_ERRORS as error:
+        print(f'error: {" ".join(str(error).split())}', file=sys.stderr)
+        code = 1
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if node is not None:
+            node.destroy_node()
+        api.try_shutdown()
+    return code
+
+
+if __name__ == '__main__':
+    sys.exit(main())
