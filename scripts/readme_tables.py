@@ -20,10 +20,10 @@ README = Path(__file__).resolve().parent.parent / 'README.md'
 PRESETS = ('paper', 'husky_ros1', 'clearpath_jazzy')
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+def table(head: Iterable[str], rows: Iterable[tuple[object, ...]]) -> str:
     """Return a Markdown table."""
     heading = list(head)
-    lines = [heading, ['---'] * len(heading), *([*row] for row in rows)]
+    lines: list[list[object]] = [[*heading], ['---'] * len(heading), *([*row] for row in rows)]
     return '\n'.join('| ' + ' | '.join(str(cell).replace('|', '\\|') for cell in line) + ' |'
                      for line in lines)
 
@@ -31,14 +31,12 @@ def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 def verbs() -> str:
     """Return each verb of lg_husky with the first sentence of its help."""
     import click
-
     from lg_husky_sim.cli.main import cli
     context = click.Context(cli)
     rows = []
     for verb in cli.list_commands(context):
         command = cli.get_command(context, verb)
-        assert command is not None
-        rows.append((f'`{verb}`', command.get_short_help_str(200)))
+        rows.append((f'`{verb}`', command.get_short_help_str(200) if command else ''))
     return table(('verb', 'what it does'), rows)
 
 
@@ -57,7 +55,7 @@ def published(preset: str) -> dict[str, tuple[str, str]]:
 
     settings = make_settings(preset=preset, publish_tf=True, publish_clock=True)
     with (mock.patch.object(outputs, 'message_type', message_type),
-          mock.patch.object(outputs.Outputs, 'configure', lambda *_: None)):
+          mock.patch.object(outputs.Outputs, 'configure', return_value=None)):
         outputs.Outputs(Recorder(), settings)  # type: ignore[arg-type]
     names = {value: name for name, value in preset_values(preset).items()
              if name.endswith('_topic')}
@@ -97,7 +95,7 @@ def shown(value: object) -> str:
         return f'`{str(value).lower()}`'
     if isinstance(value, (list, tuple)):
         return f'`[{", ".join(map(str, value))}]`'
-    return f'`{value}`' if value != '' else '`\'\'`'
+    return f'`{value}`' if value != '' else "`''`"
 
 
 def parameters() -> str:
