@@ -16,10 +16,10 @@ import numpy as np
 PERIOD = 0.01
 """Step of a replay [s]."""
 WINDOW = 0.4
-"""Length of the samples that the initial state is estimated from [s]."""
+"""Length of the samples that the initial pose is estimated from [s]."""
 
 STILL = 0.02
-"""Wheel rates [rad/s] and commands [m/s, rad/s] below this are rest."""
+"""Wheel rates below this are rest [rad/s]."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ def initial_state(segment: Segment, plant: Plant, window: float = WINDOW) -> Ini
     """
     Estimate the state at the start of a segment from its first samples.
 
-    Where the robot stands still at first, the pose is the median over that time. Otherwise it is
-    the value at the start of a straight line through the first samples, which takes most of the
-    sensor's noise out. The speed is that of the wheels as if they did not slip, or the slope of
-    the pose without them; the yaw rate is the gyro's, or else the slope of the heading, or else
-    the wheels'.
+    Where the wheels stand still at first, so does the robot, and the pose is the median over that
+    time. Otherwise the pose is the value at the start of a straight line through the first
+    samples, which takes most of the sensor's noise out; the speed is that of the wheels as if
+    they did not slip, or the slope of the pose without them; the yaw rate is the gyro's, or else
+    the slope of the heading, or else the wheels'.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def initial_state(segment: Segment, plant: Plant, window: float = WINDOW) -> Ini
     plant : Plant
         For the ratio of wheel speed to speed.
     window : float
-        Length of the samples used [s]; at least two samples are.
+        Length of the samples that the line is fitted to [s]; at least two samples are.
 
     Returns
     -------
@@ -74,24 +74,25 @@ def initial_state(segment: Segment, plant: Plant, window: float = WINDOW) -> Ini
     rest = _rest(segment)
     if 'pose' in streams:
         value, slope = local_fit(streams['pose'], start, window, ahead=True)
-        if rest >= window:
-            value = np.median(streams['pose'].slice(start, start + rest).values, axis=0)
-            slope = np.zeros(3)
+        still = streams['pose'].slice(start, start + rest).values
+        if len(still):
+            value = np.median(still, axis=0)
         pose = Pose(*(float(part) for part in value))
         forward = float(np.cos(pose.heading) * slope[0] + np.sin(pose.heading) * slope[1])
         yaw = float(slope[2])
     if 'wheels' in streams:
-        left, right = _mean(streams['wheels'], start, 0.5 * window)
+        left, right = (float(rate) for rate in streams['wheels'].values[0])
         rates = (left, right)
         forward, turning = _rolling(plant, left, right)
         yaw = yaw if 'pose' in streams else turning
     if 'imu' in streams:
-        yaw = _mean(streams['imu'], start, 0.5 * window)[0]
+        yaw = float(streams['imu'].column('yaw_rate')[0])
     if 'wheel_angles' in streams:
-        value, _ = local_fit(streams['wheel_angles'], start, window, ahead=True)
-        angles = (float(value[0]), float(value[1]))
-    if rest >= window:
+        first = streams['wheel_angles'].values[0]
+        angles = (float(first[0]), float(first[1]))
+    if rest >= 0.0:
         forward = yaw = 0.0
+        rates = (0.0, 0.0)
     return InitialState(pose, BodyTwist(forward, yaw), rates, angles)
 
 
@@ -116,6 +117,7 @@ def replay(
     TimeSeries
         The simulator's columns as its sensors read them, from the segment's start to its end.
     """
+    plant = plant.in_recording(segment.recording)
     at = start or initial_state(segment, plant)
     end = segment.end + period  # the last sample lies inside the grid
     truth = rollout(plant, segment.streams['command'], end, period, segment.start, at.pose,
@@ -124,25 +126,15 @@ def replay(
 
 
 def _rest(segment: Segment) -> float:
-    """Return how long wheels and command stay at zero at first [s]; 0 without wheels."""
-    streams = segment.streams
-    if 'wheels' not in streams:
-        return 0.0
-    ends = [segment.end]
-    for series in (streams['wheels'], streams['command']):
-        moving = np.any(np.abs(series.values) > STILL, axis=1)
-        if np.any(moving):
-            ends.append(float(series.times[np.argmax(moving)]))
-    still = streams['wheels'].times
-    # The last wheel sample that is still at zero: the robot may start right after it.
-    before = still[still < min(ends)]
-    return float(before[-1]) - segment.start if before.size else 0.0
-
-
-def _mean(series: TimeSeries, start: float, window: float) -> tuple[float, ...]:
-    part = series.slice(start, start + window)
-    rows = part.values if len(part) else series.values[:1]
-    return tuple(float(value) for value in rows.mean(axis=0))
+    """Return how long the wheels stand still at first [s]; -1 if they do not, or are unknown."""
+    if 'wheels' not in segment.streams:
+        return -1.0
+    wheels = segment.streams['wheels']
+    moving = np.any(np.abs(wheels.values) > STILL, axis=1)
+    if moving[0]:
+        return -1.0
+    last = int(np.argmax(moving)) - 1 if np.any(moving) else len(wheels) - 1
+    return float(wheels.times[last]) - segment.start
 
 
 def _rolling(plant: Plant, left: float, right: float) -> tuple[float, float]:

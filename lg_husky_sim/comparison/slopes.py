@@ -11,6 +11,8 @@ from scipy.ndimage import median_filter
 WINDOW = 0.5
 """Length of the samples that a rate of change is taken from [s]."""
 
+CURVED = 8
+"""Samples from which on a parabola can be told from noise."""
 NEIGHBOURS = 7
 SPIKE = 0.2
 """Least distance from its neighbours [m] at which a position is a spike."""
@@ -31,7 +33,8 @@ def local_fit(
     window : float
         Length of the samples used [s]; the nearest two where fewer lie in it.
     ahead : bool
-        Whether the window begins at `time` instead of being centred on it.
+        Whether the window begins at `time` instead of being centred on it. With eight samples
+        or more, a parabola takes the line's place where it leaves less than half the squares.
 
     Returns
     -------
@@ -45,11 +48,25 @@ def local_fit(
         part = TimeSeries(series.times[near], series.values[near], series.names)
     offsets = part.times - time
     if len(part) < 2 or np.ptp(offsets) == 0.0:
-        return part.values.mean(axis=0), np.zeros(len(series.names))
-    spread = offsets - offsets.mean()
-    slope: FloatArray = spread @ part.values / (spread @ spread)
-    value: FloatArray = part.values.mean(axis=0) - slope * offsets.mean()
+        mean: FloatArray = part.values.mean(axis=0)
+        return mean, np.zeros(len(series.names))
+    line, rest = _polynomial(offsets, part.values, 1)
+    value, slope = line[0], line[1]
+    if ahead and len(part) >= CURVED:
+        curve, less = _polynomial(offsets, part.values, 2)
+        bent = less < 0.5 * rest
+        value, slope = np.where(bent, curve[0], value), np.where(bent, curve[1], slope)
     return value, slope
+
+
+def _polynomial(
+    offsets: FloatArray, values: FloatArray, degree: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Return coefficients, lowest first, and the sum of squares that is left of each column."""
+    columns = np.vander(offsets, degree + 1, increasing=True)
+    coefficients: FloatArray = np.linalg.lstsq(columns, values, rcond=None)[0]
+    left: FloatArray = np.sum((values - columns @ coefficients) ** 2, axis=0)
+    return coefficients, left
 
 
 def body_rates(pose: TimeSeries, window: float = WINDOW) -> TimeSeries:

@@ -7,7 +7,14 @@ from __future__ import annotations
 import math
 
 from lg_husky_sim.comparison.metrics import (
-    channel_errors, measured_channels, pooled, predicted_at, SquareSum, Tracking, tracking)
+    channel_errors,
+    measured_channels,
+    pooled,
+    predicted_at,
+    SquareSum,
+    Tracking,
+    tracking,
+)
 from lg_husky_sim.comparison.slopes import body_rates, local_fit, without_spikes
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.recording import Segment
@@ -116,6 +123,10 @@ def test_local_fit_takes_noise_out_of_value_and_slope() -> None:
     series = TimeSeries(times, (3.0 - 2.0 * times)[:, None], ('a',))
     value, slope = local_fit(series, 0.0, 0.3, ahead=True)
     assert (value[0], slope[0]) == pytest.approx((3.0, -2.0))
+    curve = np.arange(0.0, 0.41, 0.05)
+    bent = TimeSeries(curve, (1.0 + curve**2)[:, None], ('a',))
+    assert local_fit(bent, 0.0, 0.4, ahead=True)[0][0] == pytest.approx(1.0)
+    assert local_fit(bent, 0.0, 0.8)[0][0] == pytest.approx(1.0 - 0.4**2 / 6.0, abs=0.01)
     single = TimeSeries(times[:1], np.array([[5.0]]), ('a',))
     value, slope = local_fit(single, 0.0, 0.3)
     assert (value[0], slope[0]) == (5.0, 0.0)

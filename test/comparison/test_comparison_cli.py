@@ -1,0 +1,210 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`lg_husky simulate` and `lg_husky compare` as their user runs them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from lg_husky_sim.cli.main import run
+from lg_husky_sim.recording import read_recording, segments, write_recording
+from lg_husky_sim.signals import TimeSeries
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+
+for needed in ('rosbags', 'matplotlib', 'jinja2'):
+    pytest.importorskip(needed)
+
+SCRIPT = """\
+schema: lg_husky_sim/commands/1
+steps:
+  - {duration: 1.0, forward: 0.5, yaw: 0.0}
+  - {duration: 2.0, forward: 0.5, yaw: 0.4, ramp: 0.5}
+"""
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    """Return a drive of three seconds, simulated from a script."""
+    (tmp_path / 'turn.yaml').write_text(SCRIPT)
+    assert run(['simulate', '--commands', str(tmp_path / 'turn.yaml'),
+                '--out', str(tmp_path / 'turn')]) == 0
+    return tmp_path / 'turn'
+
+
+def _message(capsys: Any) -> str:
+    text: str = capsys.readouterr().err
+    assert text.count('\n') == 1
+    assert text.startswith('error: ')
+    return text
+
+
+def test_simulate_a_script(bag: Path) -> None:
+    recording = read_recording(bag)
+    assert set(recording.streams) == {
+        'command', 'wheels', 'wheel_angles', 'wheel_torques', 'imu', 'pose'}
+    assert len(recording.stream('command')) == 61
+    wheels, angles = recording.stream('wheels'), recording.stream('wheel_angles')
+    np.testing.assert_allclose(wheels.times, np.arange(151) / 50, atol=1e-9)
+    by_sum = trapezoid(wheels.values, wheels.times, axis=0)
+    np.testing.assert_allclose(angles.values[-1], by_sum, atol=0.03)
+    imu, pose = recording.stream('imu'), recording.stream('pose')
+    turned = trapezoid(imu.column('yaw_rate'), imu.times)
+    assert pose.values[-1, 2] == pytest.approx(turned, rel=2e-3)
+    np.testing.assert_allclose(
+        imu.column('accel_y')[-1], 0.507 * imu.column('yaw_rate')[-1], rtol=0.01)
+
+
+def test_simulate_with_rate_storage_and_setting(bag: Path) -> None:
+    folder = bag.parent
+    assert run(['simulate', '--commands', str(folder / 'turn.yaml'), '--rate', '200',
+                '--storage', 'sqlite3', '--set', 'mass=60', '--out', str(folder / 'fast')]) == 0
+    assert (folder / 'fast' / 'fast.db3').is_file()
+    fast, plain = read_recording(folder / 'fast'), read_recording(bag)
+    assert len(fast.stream('pose')) == 601
+    heavier = fast.stream('imu').column('accel_x')[4]
+    assert heavier < plain.stream('imu').column('accel_x')[1]
+
+
+def test_simulate_a_recording_with_a_gap_at_its_own_stamps(bag: Path) -> None:
+    original = read_recording(bag)
+    turned = {name: series for name, series in original.streams.items() if name != 'imu'}
+    x, y, heading = turned['pose'].values.T
+    pose = np.column_stack((5.0 + np.cos(1.0) * x - np.sin(1.0) * y,
+                            -3.0 + np.sin(1.0) * x + np.cos(1.0) * y, heading + 1.0))
+    turned['pose'] = TimeSeries(turned['pose'].times, pose, turned['pose'].names)
+
+    def holed(series: TimeSeries) -> TimeSeries:
+        kept = (series.times < 0.97) | (series.times > 1.93)
+        return TimeSeries(series.times[kept], series.values[kept], series.names)
+    path = write_recording(bag.parent / 'holed',
+                           {name: holed(series) for name, series in turned.items()})
+    out = bag.parent / 'again'
+    assert run(['simulate', '--commands', str(path), '--out', str(out)]) == 0
+    again = read_recording(out)
+    assert again.start_ns == read_recording(path).start_ns
+    assert len(segments(again)) == 2
+    known = read_recording(path).stream('pose')
+    covered = (known.times <= 0.95 + 1e-9) | (known.times >= 1.95 - 1e-9)  # by commands
+    known = TimeSeries(known.times[covered], known.values[covered], known.names)
+    np.testing.assert_allclose(again.stream('pose').times, known.times, atol=1e-9)
+    np.testing.assert_allclose(again.stream('pose').values, known.values, atol=0.01)
+    assert np.median(np.diff(again.stream('imu').times)) == pytest.approx(0.02)
+
+
+def test_simulate_is_the_same_bit_for_bit(bag: Path, capsys: Any) -> None:
+    again = bag.parent / 'again' / 'turn'
+    assert run(['simulate', '--commands', str(bag.parent / 'turn.yaml'),
+                '--out', str(again)]) == 0
+    assert 'turn: 3.0 s, 151 poses, ends at x = 1.' in capsys.readouterr().out
+    assert (again / 'turn.mcap').read_bytes() == (bag / 'turn.mcap').read_bytes()
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['--commands', 'circel', '--out', 'x'], "no manoeuvre 'circel'; did you mean circle?"),
+    (['--commands', 'no/bag', '--out', 'x'], 'no recording or command script no/bag'),
+    (['--commands', 'nowhere.mcap', '--out', 'x'], 'no recording nowhere.mcap'),
+    (['--commands', 'none.yaml', '--out', 'x'], 'none.yaml: No such file'),
+    (['--commands', 'circle', '--out', '.'], '. exists already'),
+    (['--commands', 'circle', '--out', 'x', '--rate', '0'], 'rate = 0 Hz must be positive'),
+    (['--commands', 'circle', '--out', 'x', '--rate', 'nan'], 'rate = nan Hz must be positive'),
+    (['--commands', 'circle', '--out', 'x', '--set', 'mass'], "--set 'mass' is not of the form"),
+    (['--commands', 'circle', '--out', 'x', '--set', 'mas=2'], 'did you mean mass'),
+    (['--commands', 'circle', '--out', 'x', '--set', 'mass=-2'], 'mass = -2 kg is below'),
+    (['--commands', 'circle', '--out', 'x', '--topic', 'imu=/a'], '--topic is of use only with'),
+    (['--commands', 'circle', '--out', 'x', '--model', 'm.yaml'], 'm.yaml'),
+])
+def test_simulate_refuses_in_one_line(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch: Any, capsys: Any,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(['simulate', *arguments]) == 1
+    assert message in _message(capsys)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_compare_models_and_a_rival(bag: Path, capsys: Any) -> None:
+    folder = bag.parent
+    from lg_husky_sim.husky.model_file import apply_settings, load_model, save_model
+    save_model(apply_settings(load_model(), {'command_gain': 0.95}), folder / 'eager.yaml')
+    assert run(['simulate', '--commands', str(folder / 'turn.yaml'),
+                '--set', 'yaw_damping=30', '--out', str(folder / 'engine')]) == 0
+    from lg_husky_sim.husky.model_file import default_model_path
+    out = folder / 'result'
+    assert run(['compare', str(bag), '--model', str(default_model_path()), '--model',
+                str(folder / 'eager.yaml'), '--rival', str(folder / 'engine'),
+                '--out', str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r'root mean square error +paper +eager +engine', printed)
+    data = json.loads((out / 'compare.json').read_text())
+    assert data['schema'] == 'lg_husky_sim/comparison/1'
+    results = data['recordings'][0]['results']
+    assert list(results) == ['paper', 'eager', 'engine']
+    assert results['paper']['rmse']['wheel_speed'] < 2e-3
+    # The wheels' speed is proportional to the command gain: 0.95 / 0.8961, some 3.1 rad/s.
+    assert results['eager']['rmse']['wheel_speed'] == pytest.approx(0.185, rel=0.1)
+    assert results['engine']['rmse']['yaw_rate'] > 10 * results['paper']['rmse']['yaw_rate']
+    assert results['engine']['bounds_m']['y'] > 0.05
+    assert results['paper']['bounds_m']['x'] < 2e-3
+    assert data['models'][1]['parameters']['command_gain'] == 0.95
+    assert (out / 'compare.txt').read_text().strip() in printed
+    names = {path.name for path in out.iterdir()}
+    assert names == {'compare.json', 'compare.txt', 'index.html', '01_turn_01_responses.png',
+                     '01_turn_01_trajectory.png'}
+
+
+def test_the_page_is_self_contained_and_escaped(bag: Path) -> None:
+    name = '<script>alert(1)</script>'
+    evil = write_recording(bag.parent / 'evil', read_recording(bag).streams)
+    evil = evil.rename(bag.parent / name.replace('/', '∕'))
+    out = bag.parent / 'result'
+    assert run(['compare', str(evil), '--out', str(out), '--horizon', '1.5']) == 0
+    page = (out / 'index.html').read_text()
+    assert '<script' not in page
+    assert '&lt;script&gt;' in page
+    assert page.count('src="data:image/png;base64,') == 4  # two windows, two pictures each
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+
+
+def test_compare_replaces_its_own_results_only(bag: Path, capsys: Any) -> None:
+    out = bag.parent / 'result'
+    assert run(['compare', str(bag), '--out', str(out), '--figures', '0']) == 0
+    (out / 'stale.png').write_bytes(b'')
+    assert run(['compare', str(bag), '--out', str(out), '--figures', '0']) == 0
+    assert not (out / 'stale.png').exists()
+    capsys.readouterr()
+    assert run(['compare', str(bag), '--out', str(bag)]) == 1
+    assert 'is not empty and holds no compare.json' in _message(capsys)
+    assert read_recording(bag).stream('pose')
+
+
+@pytest.mark.parametrize(('extra', 'message'), [
+    (['--horizon', '-1'], '--horizon -1 s must be 0 or positive'),
+    (['--horizon', 'nan'], '--horizon nan s must be 0 or positive'),
+    (['--rival', 'a', '--rival', 'b'], '2 rivals for 1 recordings'),
+    (['--topic', 'command=/nope'], 'no topic /nope for command; there are'),
+    (['--set', 'mass=nan'], 'mass = nan kg is not a finite number'),
+])
+def test_compare_refuses_in_one_line(
+    extra: list[str], message: str, bag: Path, capsys: Any,
+) -> None:
+    before = set(bag.parent.iterdir())
+    capsys.readouterr()
+    assert run(['compare', str(bag), '--out', str(bag.parent / 'result'), *extra]) == 1
+    assert message in _message(capsys)
+    assert set(bag.parent.iterdir()) == before
+
+
+def test_compare_needs_commands_and_a_measurement(bag: Path, capsys: Any) -> None:
+    streams = read_recording(bag).streams
+    for name, kept, message in (
+            ('mute', ('wheels', 'pose'), 'has no command; streams: wheels, pose'),
+            ('blind', ('command',), 'has nothing to compare: its streams (command)')):
+        path = write_recording(bag.parent / name, {key: streams[key] for key in kept})
+        capsys.readouterr()
+        assert run(['compare', str(path), '--out', str(bag.parent / 'result')]) == 1
+        assert message in _message(capsys)
