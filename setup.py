@@ -34,15 +34,16 @@ EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale']]
 EXTRAS['test'] = ['hypothesis>=6.100', 'pytest>=8', 'pytest-xdist>=3.5']
 EXTRAS['dev'] = [
     *EXTRAS['test'],
-    'flake8>=7',
-    'flake8-builtins>=2.5',
-    'flake8-comprehensions>=3.14',
-    'flake8-docstrings>=1.7',
-    'flake8-import-order>=0.18.2',
-    'flake8-quotes>=3.4',
-    'mypy>=1.11',
-    'pydocstyle>=6.3',
-    'ruff>=0.6',
+    # Linters are held at one version each: a newer one may find what was fine yesterday.
+    'flake8~=7.5.0',
+    'flake8-builtins~=3.1.0',
+    'flake8-comprehensions~=3.17.0',
+    'flake8-docstrings~=1.7.0',
+    'flake8-import-order~=0.19.0',
+    'flake8-quotes~=3.4.0',
+    'mypy~=2.4.0',
+    'pydocstyle~=6.3.0',
+    'ruff~=0.17.0',
     'types-PyYAML',
     'types-tqdm',
 ]

@@ -11,6 +11,7 @@ from lg_husky_sim.errors import MissingExtraError
 EXTRA_OF = {
     'cyclonedds': 'dds',
     'dask': 'scale',
+    'deap': 'search',
     'distributed': 'scale',
     'jinja2': 'report',
     'matplotlib': 'plot',

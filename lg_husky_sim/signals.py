@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from lg_husky_sim.errors import RecordingError
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from lg_husky_sim.errors import RecordingError
 
 FloatArray = NDArray[np.float64]
 

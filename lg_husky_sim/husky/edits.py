@@ -10,9 +10,8 @@ import re
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import Effect
-from lg_husky_sim.husky.laws import EXPRESSIONS, SIGNALS, Law
-from lg_husky_sim.linear_graph import (
-    Branch, Characteristic, Domain, Kind, LinearGraph, TwoPort)
+from lg_husky_sim.husky.laws import EXPRESSIONS, Law, SIGNALS
+from lg_husky_sim.linear_graph import Branch, Characteristic, Domain, Kind, LinearGraph, TwoPort
 from lg_husky_sim.linear_graph.expressions import names_in
 
 #: A coefficient of a law: a number, or an expression in the names of the parameters.
@@ -116,7 +115,8 @@ def branch_of(graph: LinearGraph, name: str) -> Branch:
 
 
 def _element_of(graph: LinearGraph, name: str) -> Branch | TwoPort:
-    return next(e for e in (*graph.branches, *graph.two_ports) if e.name == name)
+    elements: tuple[Branch | TwoPort, ...] = (*graph.branches, *graph.two_ports)
+    return next(element for element in elements if element.name == name)
 
 
 _MOTORS = (('1', 'L', '2'), ('2', 'R', '1'))

@@ -15,8 +15,8 @@ from __future__ import annotations
 import enum
 import math
 
-from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.jit import jit
+from lg_husky_sim.signals import FloatArray
 
 #: Coefficients that a row can hold.
 WIDTH = 24
@@ -116,7 +116,7 @@ def _table(coefficients: FloatArray, c: int, j: int, argument: float) -> float:
 def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int,
                 memory: FloatArray, time: float) -> float:
     # Laws of the electrical side: what the driver adds to its own voltage.
-    own = z[o]
+    own: float = z[o]
     if law == 7:
         return _clip(own, p2 * z[o + 1] - p1 * p0, p2 * z[o + 1] + p1 * p0) - own
     if law == 8:
@@ -126,13 +126,13 @@ def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int
     if law == 10:
         return _clip(own, -p0, p0) - own
     if law == 11:
-        return -own / p1 * p0 * (own * z[o + 2] + z[o + 1] * z[o + 3]) / p1
+        return float(-own / p1 * p0 * (own * z[o + 2] + z[o + 1] * z[o + 3]) / p1)
     if law == 12:
         return -own * min(p0 * max(time, 0.0), p1)
     if law == 13:
-        return -p0 * memory[int(p2)] * own
+        return float(-p0 * memory[int(p2)] * own)
     if abs(memory[2 + int(p2)]) < 0.5 * p0:
-        return -p1 * z[o + 2]
+        return float(-p1 * z[o + 2])
     return 0.0
 
 

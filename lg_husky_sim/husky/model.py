@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 import enum
 from functools import lru_cache
 
-import numpy as np
-
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky import network
-from lg_husky_sim.husky.edits import EditedNetwork, branch_of, edit
+from lg_husky_sim.husky.edits import branch_of, edit, EditedNetwork
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.laws import WIDTH
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet, SensorModel
-from lg_husky_sim.husky.speed_loop import STATES as LOOP_STATES, close_speed_loop
-from lg_husky_sim.linear_graph import NumericModel, StateSpace, compile_numeric
-from lg_husky_sim.linear_graph.expressions import GLOBALS, compile_tuple
+from lg_husky_sim.husky.speed_loop import close_speed_loop
+from lg_husky_sim.husky.speed_loop import STATES as LOOP_STATES
+from lg_husky_sim.linear_graph import compile_numeric, NumericModel, StateSpace
+from lg_husky_sim.linear_graph.expressions import compile_tuple, GLOBALS
+import numpy as np
 
 
 class Drivetrain(enum.Enum):

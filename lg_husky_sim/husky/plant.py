@@ -7,10 +7,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from lg_husky_sim.husky.effects import Onset
 from lg_husky_sim.signals import FloatArray, TimeSeries
+import numpy as np
 
 #: Rows of the output matrices.
 OUTPUTS = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate', 'current_left', 'current_right',

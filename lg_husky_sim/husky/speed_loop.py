@@ -7,10 +7,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
-from lg_husky_sim.husky.laws import WIDTH, Law
+from lg_husky_sim.husky.laws import Law, WIDTH
 from lg_husky_sim.husky.plant import PlantSet
+import numpy as np
 
 #: States that the loop adds.
 STATES = ('reference(left)', 'reference(right)', 'integral(left)', 'integral(right)')

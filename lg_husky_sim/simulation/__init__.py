@@ -2,6 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stepping: no clock, no ROS."""
 
-from lg_husky_sim.simulation.simulator import Simulator, SimulatorState, rollout
+from lg_husky_sim.simulation.simulator import rollout, Simulator, SimulatorState
 
 __all__ = ['Simulator', 'SimulatorState', 'rollout']

@@ -7,14 +7,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lg_husky_sim.husky.effects import OnsetKind
 from lg_husky_sim.husky.laws import WIDTH
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.kernel import COMMAND, DELAY
+import numpy as np
+from numpy.typing import NDArray
 
 #: Edges of the panels of the pose quadrature [s]: graded, since a change of the voltage excites
 #: the fast electrical modes at the start of a step.

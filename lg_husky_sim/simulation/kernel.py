@@ -28,11 +28,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from lg_husky_sim.signals import FloatArray
-from lg_husky_sim.jit import jit
 from lg_husky_sim.husky.laws import evaluate, remember
+from lg_husky_sim.jit import jit
+from lg_husky_sim.signals import FloatArray
+import numpy as np
 
 #: Columns of an output row.
 COLUMNS = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate', 'current_left', 'current_right',

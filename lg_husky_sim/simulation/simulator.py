@@ -7,14 +7,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-import numpy as np
-
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.laws import MEMORY
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
-from lg_husky_sim.simulation.discretise import Operators, discretise
+from lg_husky_sim.simulation.discretise import discretise, Operators
 from lg_husky_sim.simulation.kernel import COLUMNS, DELAY, run
+import numpy as np
 
 _TAIL = 4 + 3 + MEMORY + 2 + 1 + 2 * DELAY
 
@@ -307,5 +306,5 @@ def rollout(plant: Plant, commands: TimeSeries, end: float, period: float = 0.02
     count = max(0, math.floor((end - first) / period + 1e-9))
     state = simulator.initial(pose, twist, first, wheel_rates, wheel_angles)
     _, out = simulator.run(state, hold(commands, first, period, count))
-    times = first + period * np.arange(count + 1)
+    times: FloatArray = first + period * np.arange(count + 1, dtype=np.float64)
     return TimeSeries(times, np.vstack([state.row, out]), COLUMNS)
