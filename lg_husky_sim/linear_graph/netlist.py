@@ -23,7 +23,7 @@ with a unit, which then is a parameter of the element's name.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 import re
@@ -45,7 +45,6 @@ from lg_husky_sim.linear_graph.expressions import is_name, names_in
 from lg_husky_sim.linear_graph.graph import GROUND, LinearGraph, suggestion
 from lg_husky_sim.linear_graph.units import check_units, parse_unit, unit_needed
 
-MAX_BYTES = 1_000_000
 _EVERYDAY: Mapping[Domain, Mapping[str, Kind]] = {
     Domain.ELECTRICAL: {
         'voltage source': Kind.ACROSS_SOURCE, 'current source': Kind.THROUGH_SOURCE,
@@ -106,7 +105,7 @@ def read_netlist(path: str | Path) -> Netlist:
     Parameters
     ----------
     path : path-like
-        YAML file of at most 1 MB.
+        YAML file.
 
     Returns
     -------
@@ -116,19 +115,13 @@ def read_netlist(path: str | Path) -> Netlist:
     ------
     ModelFileError
         If the file is no netlist; the message says which file, which element and what is wrong.
-    OSError
-        If it cannot be read.
     """
-    path = Path(path)
-    with path.open('rb') as file:
-        data = file.read(MAX_BYTES + 1)
-    if len(data) > MAX_BYTES:
-        raise ModelFileError(f'{path}: larger than {MAX_BYTES} bytes, so it is no netlist')
+    from lg_husky_sim.yaml_files import read_yaml
+
     try:
-        text = data.decode('utf-8')
-    except UnicodeDecodeError as error:
-        raise ModelFileError(f'{path}: is no UTF-8 text') from error
-    return parse_netlist(text, str(path))
+        return _netlist(read_yaml(path, ModelFileError))
+    except (GraphError, ModelFileError) as error:
+        raise ModelFileError(f'{path}: {error}') from error
 
 
 def parse_netlist(text: str, source: str = 'netlist') -> Netlist:
@@ -142,39 +135,12 @@ def parse_netlist(text: str, source: str = 'netlist') -> Netlist:
     source : str
         What to call it in messages.
     """
+    from lg_husky_sim.yaml_files import parse_yaml
+
     try:
-        return _netlist(_load(text))
-    except (GraphError, ModelFileError) as error:
+        return _netlist(parse_yaml(text))
+    except (GraphError, ModelFileError, ValueError) as error:
         raise ModelFileError(f'{source}: {error}') from error
-
-
-def _load(text: str) -> Any:
-    """Read YAML with safe tags only, without aliases, and with every key once."""
-    import yaml
-
-    class Loader(yaml.SafeLoader):
-        def compose_node(self, parent: Any, index: Any) -> Any:
-            if self.check_event(yaml.AliasEvent):
-                raise ModelFileError('YAML aliases (*name) are not allowed; write the text out')
-            return super().compose_node(parent, index)
-
-        def construct_mapping(self, node: Any, deep: bool = False) -> dict[Hashable, Any]:
-            seen = set()
-            for key, _ in node.value:
-                if key.value.__hash__ is not None and isinstance(key.value, str):
-                    if key.value in seen:
-                        line = key.start_mark.line + 1
-                        raise ModelFileError(f'line {line}: {key.value!r} is there twice')
-                    seen.add(key.value)
-            return super().construct_mapping(node, deep)
-    try:
-        return yaml.load(text, Loader)  # noqa: S506 - Loader is a SafeLoader
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        where = f'line {mark.line + 1}: ' if mark is not None else ''
-        raise ModelFileError(f'{where}{error.problem or error.context}') from error
-    except (yaml.YAMLError, RecursionError, ValueError, OverflowError, TypeError) as error:
-        raise ModelFileError(f'cannot be read as YAML ({type(error).__name__})') from error
 
 
 def _netlist(data: Any) -> Netlist:

@@ -1,0 +1,133 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A derivation written out: equations, matrices and poles, as plain text or LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from lg_husky_sim.linear_graph.elements import Branch, TwoPort
+from lg_husky_sim.linear_graph.equations import Equations, latex_of, state_equations
+from lg_husky_sim.linear_graph.graph import LinearGraph
+from lg_husky_sim.linear_graph.numeric import NumericModel
+from lg_husky_sim.linear_graph.state_space import MATRICES
+from lg_husky_sim.linear_graph.symbolic import SymbolicStateSpace
+
+_SHAPES = {'A': ('states', 'states'), 'B': ('states', 'inputs'), 'C': ('outputs', 'states'),
+           'D': ('outputs', 'inputs'), 'E': ('states', 'inputs'), 'F': ('outputs', 'inputs'),
+           'G': ('states', 'efforts'), 'H': ('arguments', 'states'),
+           'K': ('arguments', 'inputs'), 'L_c': ('outputs', 'efforts'),
+           'N': ('arguments', 'efforts')}
+
+
+def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
+                graph: LinearGraph | None = None,
+                numbers: tuple[NumericModel, Mapping[str, float]] | None = None) -> str:
+    """
+    Write a derivation as plain text.
+
+    Parameters
+    ----------
+    title : str
+        Heading.
+    steps : Equations
+        Kirchhoff's laws and constitutive equations.
+    model : SymbolicStateSpace
+        The result.
+    graph : LinearGraph, optional
+        Given, the elements' values are listed (where the equations write element names).
+    numbers : tuple of (NumericModel, mapping), optional
+        Given, the poles are listed.
+
+    Returns
+    -------
+    str
+    """
+    parts = [title, '=' * len(title), '', steps.text]
+    if graph is not None:
+        parts += ['', 'Values of the elements', *_values(graph)]
+    parts += ['', 'State-space model', f'  x = [{", ".join(model.states)}]',
+              f'  u = [{", ".join(model.inputs)}]', f'  y = [{", ".join(model.outputs)}]']
+    if model.efforts:
+        parts += [f'  f = [{", ".join(model.efforts)}]',
+                  f'  z = [{", ".join(model.arguments)}]']
+    if model.dependent:
+        parts.append(f'  excess storages, which add no state: {", ".join(model.dependent)}')
+    parts += ['', *(f'  {line}' for line in state_equations(model)), '']
+    for name in MATRICES:
+        matrix = getattr(model, name)
+        if _is_shown(name, matrix):
+            parts += [f'{name} ({" by ".join(_SHAPES[name])})', *_table(matrix), '']
+    if numbers is not None:
+        parts.append(_poles(*numbers))
+    return '\n'.join(parts).rstrip()
+
+
+def _is_shown(name: str, matrix: Any) -> bool:
+    return 0 not in matrix.shape and (name in 'ABCD' or not matrix.is_zero_matrix)
+
+
+def _values(graph: LinearGraph) -> list[str]:
+    elements: list[Branch | TwoPort] = [*graph.branches, *graph.two_ports]
+    return [f'  {element.name} = {element.value}' for element in elements
+            if element.characteristic is None and element.value]
+
+
+def _table(matrix: Any) -> list[str]:
+    """Return a matrix of texts in columns; wide ones entry by entry."""
+    rows, columns = matrix.shape
+    cells = [[str(matrix[i, j]) for j in range(columns)] for i in range(rows)]
+    widths = [max(len(row[j]) for row in cells) for j in range(columns)]
+    if sum(widths) + 2 * columns <= 96:
+        return ['  [' + '  '.join(cell.rjust(width) for cell, width in
+                                  zip(row, widths, strict=True)) + ']' for row in cells]
+    return [f'  ({i + 1},{j + 1}) = {cells[i][j]}' for i in range(rows)
+            for j in range(columns) if cells[i][j] != '0']
+
+
+def _poles(model: NumericModel, values: Mapping[str, float]) -> str:
+    poles = model.at(values).poles
+    shown = ', '.join(f'{p.real:.6g}' if p.imag == 0.0 else f'{p.real:.6g}{p.imag:+.6g}j'
+                      for p in poles)
+    return f'Poles with the numbers of the model [1/s]: {shown}'
+
+
+def latex_report(title: str, steps: Equations, model: SymbolicStateSpace) -> str:
+    """
+    Write a derivation as LaTeX (needs amsmath).
+
+    Parameters
+    ----------
+    title : str
+        Heading, written as a comment.
+    steps : Equations
+        Kirchhoff's laws and constitutive equations.
+    model : SymbolicStateSpace
+        The result.
+
+    Returns
+    -------
+    str
+    """
+    import sympy
+
+    parts = [f'% {" ".join(title.split())}', steps.latex, '% State-space model']
+    state, inputs, output = (_column(names) for names in
+                             (model.states, model.inputs, model.outputs))
+    drive = rf' + B {inputs}' if model.inputs else ''
+    effort = rf' + G {_column(model.efforts)}' if model.efforts else ''
+    parts.append(rf'\[ \frac{{d}}{{dt}} {state} = A {state}{drive}{effort} \]')
+    if model.outputs:
+        parts.append(rf'\[ {output} = C {state}' + (rf' + D {inputs}' if drive else '') + r' \]')
+    for name in MATRICES:
+        matrix = getattr(model, name)
+        if _is_shown(name, matrix):
+            names = {symbol: latex_of(symbol.name) for symbol in matrix.free_symbols}
+            body = sympy.latex(matrix, mat_str='bmatrix', mat_delim='', symbol_names=names)
+            parts.append(rf'\[ {name} = {body} \]')
+    return '\n'.join(parts)
+
+
+def _column(names: tuple[str, ...]) -> str:
+    return r'\begin{bmatrix} ' + r' \\ '.join(latex_of(n) for n in names) + r' \end{bmatrix}'
