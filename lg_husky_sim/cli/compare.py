@@ -38,9 +38,10 @@ def command(
 
     Each segment without a gap starts in the state that the robot was in. DIR gets the paper's
     figures (responses; trajectory and tracking error), the root mean square error of each
-    channel and the largest tracking errors, as a table, as JSON and on one page.
+    channel and the largest tracking errors, as a table, as JSON and on one page. Give the
+    recordings in the order in which they were driven.
     """
-    from lg_husky_sim.comparison.models import load_plants
+    from lg_husky_sim.comparison.models import load_plants, plants_in
     from lg_husky_sim.comparison.outcome import compare_recording, text_table
     from lg_husky_sim.comparison.page import check_extras, MARKER, pictured, write_files
     from lg_husky_sim.errors import CommandError
@@ -56,21 +57,26 @@ def command(
     if rivals and len(rivals) != len(recordings):
         raise CommandError(f'{len(rivals)} rivals for {len(recordings)} recordings: give one '
                            'for each recording, in their order, or none')
-    plants = load_plants(models, parse_settings(settings))
+    overridden = parse_settings(settings)
+    plants = load_plants(models, overridden)
     choice = TopicMap.parse(topics)
+    read = [read_recording(path, choice) for path in tqdm(
+        recordings, desc='reading', unit='recording', disable=None, leave=False)]
+    names = [recording.name for recording in read]
     outcomes = []
-    for place, path in enumerate(tqdm(recordings, desc='replaying', unit='recording',
-                                      disable=None, leave=False)):
+    for place, recording in enumerate(tqdm(read, desc='replaying', unit='recording',
+                                           disable=None, leave=False)):
         rival = None
         if rivals:
             rival = (_rival_label(rivals, place), read_recording(rivals[place]))
-        outcomes.append(compare_recording(read_recording(path, choice), plants, rival, horizon))
+        outcomes.append(compare_recording(
+            recording, plants_in(plants, recording.name, names), rival, horizon))
     total = sum(1 for outcome in outcomes for _ in pictured(outcome, most))
     with result_folder(out, MARKER) as folder, \
             tqdm(total=total, desc='drawing', unit='segment', disable=None, leave=False) as bar:
-        write_files(folder, outcomes, plants, horizon, most, bar.update)
+        write_files(folder, outcomes, plants, horizon, most, overridden, bar.update)
     click.echo(text_table(outcomes))
-    click.echo(f'{out / "index.html"}: {total} segments with pictures')
+    click.echo(f'{out / "index.html"}: pictures of {total} segment{"s" if total != 1 else ""}')
 
 
 def _rival_label(rivals: tuple[str, ...], place: int) -> str:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lg_husky_sim.husky.model import compile_model
@@ -50,7 +50,8 @@ def load_plants(
     Returns
     -------
     tuple of NamedPlant
-        Labels are the files' names, with their folder where two are the same.
+        Labels are the files' names, with their folder where two are the same; the packaged
+        Husky is called paper as long as no setting changes it.
 
     Raises
     ------
@@ -60,9 +61,41 @@ def load_plants(
         If a setting is unknown or out of bounds.
     """
     places = tuple(paths) or (default_model_path(),)
-    return tuple(
-        _named(label, place, settings or {})
-        for label, place in zip(unique_labels(places), places, strict=True))
+    labels = unique_labels(places)
+    if not settings and default_model_path() in places:
+        labels = tuple('paper' if place == default_model_path() else label
+                       for label, place in zip(labels, places, strict=True))
+    return tuple(_named(label, place, settings or {})
+                 for label, place in zip(labels, places, strict=True))
+
+
+def plants_in(
+    plants: Sequence[NamedPlant], name: str, names: Sequence[str],
+) -> tuple[NamedPlant, ...]:
+    """
+    Return plants as they are in one of several recordings.
+
+    An effect that begins in a named recording is absent in those before it.
+
+    Parameters
+    ----------
+    plants : sequence of NamedPlant
+    name : str
+        Name of the recording.
+    names : sequence of str
+        Names of all recordings in the order of time.
+
+    Returns
+    -------
+    tuple of NamedPlant
+    """
+    found = []
+    for named in plants:
+        onset = named.plant.onset
+        earlier = names[:names.index(onset.recording)] if (
+            onset is not None and onset.recording in names) else ()
+        found.append(replace(named, plant=named.plant.in_recording(name, earlier)))
+    return tuple(found)
 
 
 def unique_labels(paths: Sequence[Path]) -> tuple[str, ...]:
@@ -72,12 +105,13 @@ def unique_labels(paths: Sequence[Path]) -> tuple[str, ...]:
     The file's name without ending; with its folder where two are the same, and numbered where
     that does not help either.
     """
-    labels = ['paper' if path == default_model_path() else path.stem for path in paths]
-    for place, path in enumerate(paths):
-        if labels.count(labels[place]) > 1 and path.resolve().parent.name:
-            labels[place] = f'{path.resolve().parent.name}/{path.stem}'
-    return tuple(label if labels.count(label) == 1 else f'{label} {labels[:k].count(label) + 1}'
-                 for k, label in enumerate(labels))
+    stems = [path.stem for path in paths]
+    labels = [
+        f'{path.resolve().parent.name}/{stem}' if stems.count(stem) > 1 else stem
+        for path, stem in zip(paths, stems, strict=True)]
+    return tuple(
+        label if labels.count(label) == 1 else f'{label} {labels[:place].count(label) + 1}'
+        for place, label in enumerate(labels))
 
 
 def _named(label: str, path: Path, settings: Mapping[str, float]) -> NamedPlant:

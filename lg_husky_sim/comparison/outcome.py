@@ -169,6 +169,7 @@ def text_table(outcomes: Sequence[RecordingOutcome]) -> str:
 
 def as_json(
     outcomes: Sequence[RecordingOutcome], plants: Sequence[NamedPlant], horizon: float = 0.0,
+    settings: Mapping[str, float] | None = None,
 ) -> dict[str, object]:
     """Return the comparison as plain data, schema ``lg_husky_sim/comparison/1``."""
     names = labels(outcomes)
@@ -179,6 +180,7 @@ def as_json(
     return {
         'schema': SCHEMA,
         'horizon_s': horizon or None,
+        'settings': dict(settings or {}),
         'units': dict(UNITS),
         'models': [{'label': named.label, 'path': named.path, 'about': named.model.about,
                     'parameters': dict(named.model.parameters)} for named in plants],

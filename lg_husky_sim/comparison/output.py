@@ -65,7 +65,8 @@ def simulate_recording(
             f'recording {recording.name} has no stretch without a gap in which all its streams '
             f'({", ".join(recording.streams)}) overlap')
     period = min(PERIOD, 1.0 / rate) if rate else PERIOD
-    driven = [_segment_streams(replay(plant, part, period), part, torque_per_current, rate)
+    here = plant.in_recording(recording.name)
+    driven = [_segment_streams(replay(here, part, period), part, torque_per_current, rate)
               for part in parts]
     return {name: _chained([streams[name] for streams in driven]) for name in driven[0]}
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import json
 import math
@@ -45,7 +45,8 @@ class Picture:
 
 def write_files(
     folder: Path, outcomes: Sequence[RecordingOutcome], plants: Sequence[NamedPlant],
-    horizon: float = 0.0, most: int = 6, on_progress: Callable[[], object] | None = None,
+    horizon: float = 0.0, most: int = 6, settings: Mapping[str, float] | None = None,
+    on_progress: Callable[[], object] | None = None,
 ) -> tuple[Path, ...]:
     """
     Write compare.json, compare.txt, the pictures and index.html.
@@ -60,6 +61,8 @@ def write_files(
         As it was compared with.
     most : int
         Segments of a recording that get pictures, the longest ones.
+    settings : mapping of str to float, optional
+        Parameters that were overridden in every model.
     on_progress : callable, optional
         Called after the pictures of each segment.
 
@@ -74,7 +77,7 @@ def write_files(
         If matplotlib or jinja2 is not installed.
     """
     check_extras()
-    data = as_json(outcomes, plants, horizon)
+    data = as_json(outcomes, plants, horizon, settings)
     names = labels(outcomes)
     rivals = [name for name in names if name not in {named.label for named in plants}]
     styles = line_styles(names, rivals)
@@ -97,7 +100,7 @@ def write_files(
         pictures.append(made)
     (folder / 'compare.txt').write_text(text_table(outcomes), encoding='utf-8')
     (folder / 'index.html').write_text(
-        _page(outcomes, plants, names, pictures, horizon, most), encoding='utf-8')
+        _page(outcomes, plants, names, pictures, horizon, most, settings or {}), encoding='utf-8')
     (folder / MARKER).write_text(
         json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + '\n', encoding='utf-8')
     return tuple(picture.path for made in pictures for picture in made)
@@ -132,6 +135,7 @@ def _save(figure: Figure, path: Path, alt: str) -> Picture:
 def _page(
     outcomes: Sequence[RecordingOutcome], plants: Sequence[NamedPlant], names: Sequence[str],
     pictures: Sequence[Sequence[Picture]], horizon: float, most: int,
+    settings: Mapping[str, float],
 ) -> str:
     from jinja2 import Environment, PackageLoader
     environment = Environment(
@@ -150,7 +154,7 @@ def _page(
     } for outcome, made in zip(outcomes, pictures, strict=True)]
     return environment.get_template('page.html.j2').render(
         title='Model and recording compared', labels=names, recordings=recordings,
-        horizon=horizon,
+        horizon=horizon, settings=settings,
         models=[{'label': named.label, 'path': named.path, 'about': named.model.about}
                 for named in plants])
 

@@ -48,8 +48,7 @@ def local_fit(
         part = TimeSeries(series.times[near], series.values[near], series.names)
     offsets = part.times - time
     if len(part) < 2 or np.ptp(offsets) == 0.0:
-        mean: FloatArray = part.values.mean(axis=0)
-        return mean, np.zeros(len(series.names))
+        return np.asarray(part.values.mean(axis=0)), np.zeros(len(series.names))
     line, rest = _polynomial(offsets, part.values, 1)
     value, slope = line[0], line[1]
     if ahead and len(part) >= CURVED:
@@ -64,7 +63,7 @@ def _polynomial(
 ) -> tuple[FloatArray, FloatArray]:
     """Return coefficients, lowest first, and the sum of squares that is left of each column."""
     columns = np.vander(offsets, degree + 1, increasing=True)
-    coefficients: FloatArray = np.linalg.lstsq(columns, values, rcond=None)[0]
+    coefficients = np.asarray(np.linalg.lstsq(columns, values, rcond=None)[0], dtype=np.float64)
     left: FloatArray = np.sum((values - columns @ coefficients) ** 2, axis=0)
     return coefficients, left
 

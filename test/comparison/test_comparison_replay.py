@@ -5,9 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 from lg_husky_sim.comparison import channel_errors, initial_state, replay, tracking
-from lg_husky_sim.comparison.models import load_plants, NamedPlant
+from lg_husky_sim.comparison.models import load_plants, NamedPlant, plants_in, unique_labels
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.recording import Recording, Segment, segments
 from lg_husky_sim.recording.recording import cut
 from lg_husky_sim.signals import TimeSeries
@@ -88,6 +92,27 @@ def test_at_rest_a_noisy_pose_is_averaged(
 
 def test_settings_and_labels(paper: NamedPlant) -> None:
     (heavier,) = load_plants(settings={'mass': 60.0})
-    assert heavier.label == 'paper'
+    assert (paper.label, heavier.label) == ('paper', 'husky')  # no longer the paper's
     assert heavier.model.parameters['mass'] == 60.0
     assert paper.model.parameters['mass'] == 48.39
+
+
+def test_labels_are_short_and_differ() -> None:
+    paths = [Path('a/fit.yaml'), Path('b/fit.yaml'), Path('b/fit.yaml'), Path('other.yaml')]
+    assert unique_labels(paths) == ('a/fit', 'b/fit 1', 'b/fit 2', 'other')
+
+
+def test_an_onset_belongs_to_its_recording(paper: NamedPlant) -> None:
+    effect = Effect('rolling_resistance', late=True)
+    structure = Structure().with_effect(effect, Onset(OnsetKind.TIME, 5.0, 'second'))
+    parameters = paper.model.parameters.with_entries(
+        *(entry.parameter(20.0 if entry.name == 'rolling_force' else None)
+          for entry in effect.parameters()))
+    late = replace(paper, plant=compile_model(structure).at(parameters))
+    names = ['first', 'second', 'third']
+    sets = [plants_in([late], name, names)[0].plant for name in names]
+    assert [(len(plant.sets), plant.onset is not None) for plant in sets] == [
+        (1, False), (2, True), (1, False)]
+    assert sets[0].linear  # not begun
+    assert not sets[2].linear  # stays
+    assert plants_in([paper], 'first', names)[0].plant.linear
