@@ -182,7 +182,7 @@ def read_bag(path: Path) -> dict[str, Vector]:
         The bag cannot be read or lacks one of these topics.
 
     """
-    from rosbags.rosbag2 import Reader
+    from rosbags.rosbag2 import Reader, ReaderError
     commands: list[list[float]] = []
     joints: list[list[float]] = []
     imu: list[list[float]] = []
@@ -214,8 +214,9 @@ def read_bag(path: Path) -> dict[str, Vector]:
                                       item.transform.translation.x,
                                       item.transform.translation.y,
                                       2.0 * math.atan2(turn.z, turn.w)])
-    except (OSError, ValueError, RuntimeError) as error:
-        raise RecordingError(f'{path} cannot be read as a rosbag2: {error}') from error
+    except (OSError, ValueError, RuntimeError, ReaderError) as error:
+        reason = str(error).splitlines()[0]
+        raise RecordingError(f'{path} cannot be read as a rosbag2: {reason}') from error
     if not (joints and imu and poses):
         raise RecordingError(f'{path} lacks /joint_states, /imu_um7/data or /tf')
     result = {}

@@ -15,6 +15,7 @@ from lg_husky_sim.errors import CommandError
 from lg_husky_sim.proof import catalogue, effects, manoeuvres, robots, sensors, world
 from lg_husky_sim.proof.bags import write_bag
 from lg_husky_sim.proof.engine import integrate_engine
+from lg_husky_sim.proof.hidden import Setting
 from lg_husky_sim.proof.integrate import COLUMNS, Gate, integrate, ROUGH_PERIOD
 from lg_husky_sim.proof.sealing import seal
 import numpy as np
@@ -134,18 +135,18 @@ def _onset(spec: Spec, chosen: tuple[str, ...], rng: np.random.Generator) -> str
 
 
 def _setting(robot: robots.Robot, fields: Mapping[str, float],
-             drives: tuple[manoeuvres.Manoeuvre, ...], level: int) -> effects.Setting:
+             drives: tuple[manoeuvres.Manoeuvre, ...], level: int) -> Setting:
     commands = np.concatenate([drive.commands for drive in drives])
     volts = world.NOMINAL_SUPPLY * robot.command.gain * (
         np.abs(commands[:, 0]) + world.TURN_RATIO * np.abs(commands[:, 1]))
     loads = [_load(robot, drive) for drive in drives]
     steepest = max(float((np.abs(np.diff(drive.commands, axis=0)).max(axis=1)
                           / np.diff(drive.times)).max()) for drive in drives)
-    return effects.Setting(fields, float(np.abs(commands[:, 0]).max()),
-                           float(np.abs(commands[:, 1]).max()),
-                           float(min(volts.max(), world.NOMINAL_SUPPLY)), level,
-                           steepest, max(max(load[0] for load in loads), 10.0),
-                           max(load[1] for load in loads), robot.fields['loop'] > 0.5)
+    return Setting(
+        fields, float(np.abs(commands[:, 0]).max()), float(np.abs(commands[:, 1]).max()),
+        float(min(volts.max(), world.NOMINAL_SUPPLY)), level, steepest,
+        max(max(load[0] for load in loads), 10.0), max(load[1] for load in loads),
+        robot.fields['loop'] > 0.5)
 
 
 def _load(robot: robots.Robot, drive: manoeuvres.Manoeuvre) -> tuple[float, float]:

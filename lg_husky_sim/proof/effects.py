@@ -1,101 +1,28 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What each hidden effect changes, and how strongly: one small function an effect."""
+"""What each effect of the catalogue changes, and how strongly: one function an effect."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 import math
 
+from lg_husky_sim.proof import outside
 from lg_husky_sim.proof import world as w
-import numpy as np
-
-
-@dataclass(frozen=True)
-class Setting:
-    """
-    What an effect is built upon.
-
-    Attributes
-    ----------
-    fields
-        The robot before this effect.
-    most_forward, most_yaw, most_volts
-        Largest command [m/s], [rad/s] and voltage [V] of the manoeuvres.
-    level
-        0 weak, 1 medium, 2 strong.
-    steepest
-        Largest change of the command [m/s² or rad/s²].
-    squared_current, peak_current
-        Integral of i² over the longest manoeuvre, and largest |i|, without the effect, the
-        larger of both sides [A²·s], [A].
-    looped
-        A speed loop is in command.
-
-    """
-
-    fields: Mapping[str, float]
-    most_forward: float
-    most_yaw: float
-    most_volts: float
-    level: int
-    steepest: float = 20.0
-    squared_current: float = 400.0
-    peak_current: float = 20.0
-    looped: bool = False
-
-
-@dataclass(frozen=True)
-class Change:
-    """
-    A hidden effect, drawn.
-
-    Attributes
-    ----------
-    fields, command, senses
-        New values of `world.FIELDS`, `CommandPath` and `Senses` entries.
-    side
-        'left', 'right', 'both' or 'none'.
-    parameters
-        The true size, for the answer: name to value (SI).
-    gusts
-        Force of the wind [N] (it is a disturbance, not a field).
-
-    """
-
-    fields: Mapping[str, float] = field(default_factory=dict)
-    command: Mapping[str, float] = field(default_factory=dict)
-    senses: Mapping[str, float | str] = field(default_factory=dict)
-    side: str = 'none'
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    gusts: float = 0.0
-
-
-Rng = np.random.Generator
-Builder = Callable[[Setting, Rng], Change]
-
-
-def _draw(rng: Rng, s: Setting, *ranges: tuple[float, float]) -> float:
-    low, high = ranges[s.level]
-    return float(math.exp(rng.uniform(math.log(low), math.log(high))))
-
-
-def _sign(rng: Rng) -> float:
-    return 1.0 if rng.random() < 0.5 else -1.0
-
-
-def _pick(rng: Rng, *choices: str) -> str:
-    return str(rng.choice(list(choices)))
-
-
-def _sided(name: str, size: float, side: str) -> dict[str, float]:
-    return {f'{name}_left': size if side in ('left', 'both') else 0.0,
-            f'{name}_right': size if side in ('right', 'both') else 0.0}
+from lg_husky_sim.proof.hidden import (
+    Builder,
+    Change,
+    draw,
+    pick,
+    Rng,
+    Setting,
+    sided,
+    sign,
+)
 
 
 def _battery_sag(s: Setting, rng: Rng) -> Change:
-    ohms = _draw(rng, s, (0.1, 0.15), (0.2, 0.3), (0.4, 0.6))
+    ohms = draw(rng, s, (0.1, 0.15), (0.2, 0.3), (0.4, 0.6))
     slow = ohms * float(rng.uniform(0.0, 0.3))
     return Change({'battery_resistance': ohms - slow, 'polarisation': slow,
                    'polarisation_time': float(rng.uniform(3.0, 12.0))},
@@ -103,50 +30,50 @@ def _battery_sag(s: Setting, rng: Rng) -> Change:
 
 
 def _battery_droop(s: Setting, rng: Rng) -> Change:
-    depth = _draw(rng, s, (0.04, 0.06), (0.09, 0.14), (0.2, 0.3))
+    depth = draw(rng, s, (0.04, 0.06), (0.09, 0.14), (0.2, 0.3))
     return Change({'droop_depth': depth, 'droop_time': float(rng.uniform(25.0, 90.0))},
                   parameters={'final_loss_fraction': depth})
 
 
 def _current_limit(s: Setting, rng: Rng) -> Change:
     # Relative to what the drive draws without it.
-    amps = s.peak_current * _draw(rng, s, (0.6, 0.75), (0.35, 0.45), (0.12, 0.2))
+    amps = s.peak_current * draw(rng, s, (0.6, 0.75), (0.35, 0.45), (0.12, 0.2))
     return Change({'current_limit': amps}, parameters={'current_limit': amps})
 
 
 def _driver_deadband(s: Setting, rng: Rng) -> Change:
-    volts = _draw(rng, s, (0.4, 0.6), (0.9, 1.5), (2.0, 3.2))
+    volts = draw(rng, s, (0.4, 0.6), (0.9, 1.5), (2.0, 3.2))
     return Change({'deadband': volts}, parameters={'deadband_voltage': volts})
 
 
 def _voltage_saturation(s: Setting, rng: Rng) -> Change:
-    volts = min(s.most_volts, 24.0) * _draw(rng, s, (0.85, 0.9), (0.7, 0.8), (0.5, 0.62))
+    volts = min(s.most_volts, 24.0) * draw(rng, s, (0.85, 0.9), (0.7, 0.8), (0.5, 0.62))
     return Change({'clip': volts}, parameters={'voltage_limit': volts})
 
 
 def _motor_heating(s: Setting, rng: Rng) -> Change:
-    rise = s.fields['resistance'] * _draw(rng, s, (0.3, 0.5), (0.8, 1.3), (2.0, 3.5))
+    rise = s.fields['resistance'] * draw(rng, s, (0.3, 0.5), (0.8, 1.3), (2.0, 3.5))
     return Change({'heating': rise / s.squared_current,
                    'cooling_time': float(rng.uniform(80.0, 300.0))},
                   parameters={'resistance_rise': rise})
 
 
 def _command_latency(s: Setting, rng: Rng) -> Change:
-    time = _draw(rng, s, (0.04, 0.06), (0.09, 0.15), (0.2, 0.32))
+    time = draw(rng, s, (0.04, 0.06), (0.09, 0.15), (0.2, 0.32))
     return Change(command={'latency': time}, parameters={'latency': time})
 
 
 def _command_slew(s: Setting, rng: Rng) -> Change:
-    rate = min(_draw(rng, s, (1.8, 2.4), (0.9, 1.3), (0.4, 0.6)),
-               s.steepest * _draw(rng, s, (0.6, 0.7), (0.35, 0.45), (0.18, 0.25)))
+    rate = min(draw(rng, s, (1.8, 2.4), (0.9, 1.3), (0.4, 0.6)),
+               s.steepest * draw(rng, s, (0.6, 0.7), (0.35, 0.45), (0.18, 0.25)))
     yaw = rate * float(rng.uniform(1.0, 2.0))
     return Change(command={'slew_forward': rate, 'slew_yaw': yaw},
                   parameters={'acceleration_limit': rate, 'yaw_acceleration_limit': yaw})
 
 
 def _command_limit(s: Setting, rng: Rng) -> Change:
-    part = _draw(rng, s, (0.85, 0.9), (0.7, 0.8), (0.5, 0.62))
-    which = _pick(rng, 'forward', 'yaw', 'both')
+    part = draw(rng, s, (0.85, 0.9), (0.7, 0.8), (0.5, 0.62))
+    which = pick(rng, 'forward', 'yaw', 'both')
     forward = part * s.most_forward if which in ('forward', 'both') else 0.0
     yaw = part * s.most_yaw if which in ('yaw', 'both') else 0.0
     return Change(command={'limit_forward': forward, 'limit_yaw': yaw},
@@ -154,7 +81,7 @@ def _command_limit(s: Setting, rng: Rng) -> Change:
 
 
 def _speed_loop(s: Setting, rng: Rng) -> Change:
-    lag = _draw(rng, s, (0.06, 0.1), (0.15, 0.25), (0.35, 0.6))
+    lag = draw(rng, s, (0.06, 0.1), (0.15, 0.25), (0.35, 0.6))
     # The motor alone settles within milliseconds, so that integral action sets the lag.
     gain = float(rng.uniform(0.2, 0.9))
     per_volt = 1.0 / s.fields['torque_constant']
@@ -169,58 +96,58 @@ def _speed_loop(s: Setting, rng: Rng) -> Change:
 
 
 def _coulomb_drivetrain(s: Setting, rng: Rng) -> Change:
-    torque = _draw(rng, s, (1.2, 1.8), (3.0, 5.0), (7.0, 11.0))
-    side = _pick(rng, 'left', 'right', 'both')
-    return Change({**_sided('friction', torque, side),
+    torque = draw(rng, s, (1.2, 1.8), (3.0, 5.0), (7.0, 11.0))
+    side = pick(rng, 'left', 'right', 'both')
+    return Change({**sided('friction', torque, side),
                    'stribeck_ratio': float(rng.uniform(1.0, 1.4)),
                    'stribeck_speed': float(rng.uniform(0.1, 0.6))},
                   side=side, parameters={'coulomb_torque': torque})
 
 
 def _viscous_asymmetry(s: Setting, rng: Rng) -> Change:
-    loss = _draw(rng, s, (0.35, 0.55), (0.9, 1.5), (2.2, 3.5))
-    side = _pick(rng, 'left', 'right')
-    return Change({**_sided('viscous', loss, side),
+    loss = draw(rng, s, (0.35, 0.55), (0.9, 1.5), (2.2, 3.5))
+    side = pick(rng, 'left', 'right')
+    return Change({**sided('viscous', loss, side),
                    'viscous_exponent': float(rng.uniform(0.85, 1.0))},
                   side=side, parameters={'extra_damping': loss})
 
 
 def _belt_compliance(s: Setting, rng: Rng) -> Change:
-    stiffness = _draw(rng, s, (25.0, 40.0), (10.0, 16.0), (3.0, 6.0))
+    stiffness = draw(rng, s, (25.0, 40.0), (10.0, 16.0), (3.0, 6.0))
     return Change({'belt_stiffness': stiffness, 'belt_damping': float(rng.uniform(0.1, 0.5))},
                   side='both', parameters={'belt_stiffness': stiffness})
 
 
 def _gear_backlash(s: Setting, rng: Rng) -> Change:
-    gap = _draw(rng, s, (0.03, 0.05), (0.1, 0.16), (0.3, 0.5))
+    gap = draw(rng, s, (0.03, 0.05), (0.1, 0.16), (0.3, 0.5))
     return Change({'gap': gap}, side='both', parameters={'gap': gap})
 
 
 def _torque_ripple(s: Setting, rng: Rng) -> Change:
-    torque = _draw(rng, s, (0.8, 1.2), (2.0, 3.5), (5.0, 9.0))
-    side = _pick(rng, 'left', 'right', 'both')
-    return Change({**_sided('ripple', torque, side),
+    torque = draw(rng, s, (0.8, 1.2), (2.0, 3.5), (5.0, 9.0))
+    side = pick(rng, 'left', 'right', 'both')
+    return Change({**sided('ripple', torque, side),
                    'ripple_phase': float(rng.uniform(0.0, 6.28))},
                   side=side, parameters={'ripple_amplitude': torque})
 
 
 def _wheel_radius_mismatch(s: Setting, rng: Rng) -> Change:
-    part = _sign(rng) * _draw(rng, s, (0.008, 0.012), (0.02, 0.035), (0.05, 0.08))
-    side = _pick(rng, 'left', 'right')
+    part = sign(rng) * draw(rng, s, (0.008, 0.012), (0.02, 0.035), (0.05, 0.08))
+    side = pick(rng, 'left', 'right')
     name = f'radius_{side}'
     return Change({name: s.fields[name] * (1.0 + part)}, side=side,
                   parameters={'radius_change_fraction': part})
 
 
 def _traction_saturation(s: Setting, rng: Rng) -> Change:
-    force = _draw(rng, s, (26.0, 34.0), (15.0, 21.0), (7.0, 11.0))
+    force = draw(rng, s, (26.0, 34.0), (15.0, 21.0), (7.0, 11.0))
     if s.fields['tyre'] > 0.5:
         force *= 1.6
     return Change({'force_limit': force}, side='both', parameters={'wheel_force_limit': force})
 
 
 def _payload(s: Setting, rng: Rng) -> Change:
-    extra = _draw(rng, s, (4.0, 6.0), (10.0, 18.0), (25.0, 40.0))
+    extra = draw(rng, s, (4.0, 6.0), (10.0, 18.0), (25.0, 40.0))
     inertia = extra * float(rng.uniform(0.2, 0.4)) ** 2
     return Change({'mass': s.fields['mass'] + extra,
                    'yaw_inertia': s.fields['yaw_inertia'] + inertia},
@@ -228,7 +155,7 @@ def _payload(s: Setting, rng: Rng) -> Change:
 
 
 def _slope(s: Setting, rng: Rng) -> Change:
-    angle = math.radians(_draw(rng, s, (0.7, 1.0), (2.0, 3.2), (4.5, 7.0)))
+    angle = math.radians(draw(rng, s, (0.7, 1.0), (2.0, 3.2), (4.5, 7.0)))
     heading = float(rng.uniform(-math.pi, math.pi))
     pull = w.GRAVITY * math.sin(angle)
     return Change({'gravity_x': pull * math.cos(heading), 'gravity_y': pull * math.sin(heading)},
@@ -236,35 +163,35 @@ def _slope(s: Setting, rng: Rng) -> Change:
 
 
 def _rolling_resistance(s: Setting, rng: Rng) -> Change:
-    force = _draw(rng, s, (10.0, 15.0), (25.0, 42.0), (65.0, 100.0))
+    force = draw(rng, s, (10.0, 15.0), (25.0, 42.0), (65.0, 100.0))
     return Change({'rolling': force}, parameters={'rolling_force': force})
 
 
 def _quadratic_drag(s: Setting, rng: Rng) -> Change:
-    drag = _draw(rng, s, (18.0, 28.0), (45.0, 75.0), (120.0, 190.0))
+    drag = draw(rng, s, (18.0, 28.0), (45.0, 75.0), (120.0, 190.0))
     return Change({'drag': drag}, parameters={'drag_coefficient': drag})
 
 
 def _yaw_scrub_coulomb(s: Setting, rng: Rng) -> Change:
-    moment = _draw(rng, s, (0.6, 0.9), (1.8, 3.2), (5.0, 8.0))
+    moment = draw(rng, s, (0.6, 0.9), (1.8, 3.2), (5.0, 8.0))
     return Change({'scrub': moment}, parameters={'yaw_coulomb_moment': moment})
 
 
 def _yaw_scrub_speed(s: Setting, rng: Rng) -> Change:
-    part = _draw(rng, s, (0.2, 0.3), (0.6, 1.0), (1.8, 3.0))
+    part = draw(rng, s, (0.2, 0.3), (0.6, 1.0), (1.8, 3.0))
     size = part * 12.865 / max(s.most_forward, 0.3)
     return Change({'scrub_speed': size, 'scrub_exponent': float(rng.uniform(0.85, 1.3))},
                   parameters={'yaw_damping_per_speed': size})
 
 
 def _yaw_pull(s: Setting, rng: Rng) -> Change:
-    moment = _draw(rng, s, (0.5, 0.8), (1.5, 2.6), (4.0, 7.0)) * _sign(rng)
+    moment = draw(rng, s, (0.5, 0.8), (1.5, 2.6), (4.0, 7.0)) * sign(rng)
     return Change({'pull': moment}, side='left' if moment > 0 else 'right',
                   parameters={'pull_moment': moment})
 
 
 def _terrain_change(s: Setting, rng: Rng) -> Change:
-    factor = _draw(rng, s, (1.25, 1.35), (1.6, 2.0), (2.6, 3.6))
+    factor = draw(rng, s, (1.25, 1.35), (1.6, 2.0), (2.6, 3.6))
     if rng.random() < 0.3:
         factor = 1.0 / factor
     creep = factor ** float(rng.uniform(-0.4, 0.4))
@@ -275,12 +202,12 @@ def _terrain_change(s: Setting, rng: Rng) -> Change:
 
 
 def _gyro_bias(s: Setting, rng: Rng) -> Change:
-    bias = _draw(rng, s, (0.005, 0.008), (0.015, 0.03), (0.05, 0.1)) * _sign(rng)
+    bias = draw(rng, s, (0.005, 0.008), (0.015, 0.03), (0.05, 0.1)) * sign(rng)
     return Change(senses={'gyro_bias': bias}, parameters={'gyro_bias': bias})
 
 
 def _gyro_scale(s: Setting, rng: Rng) -> Change:
-    factor = 1.0 + _draw(rng, s, (0.02, 0.03), (0.05, 0.09), (0.14, 0.25)) * _sign(rng)
+    factor = 1.0 + draw(rng, s, (0.02, 0.03), (0.05, 0.09), (0.14, 0.25)) * sign(rng)
     return Change(senses={'gyro_factor': factor}, parameters={'gyro_factor': factor})
 
 
@@ -289,67 +216,16 @@ def _gyro_sign(s: Setting, rng: Rng) -> Change:
 
 
 def _encoder_scale(s: Setting, rng: Rng) -> Change:
-    factor = 1.0 + _draw(rng, s, (0.015, 0.022), (0.04, 0.065), (0.1, 0.16)) * _sign(rng)
-    side = _pick(rng, 'left', 'right')
+    factor = 1.0 + draw(rng, s, (0.015, 0.022), (0.04, 0.065), (0.1, 0.16)) * sign(rng)
+    side = pick(rng, 'left', 'right')
     return Change(senses={f'encoder_{side}': factor}, side=side,
                   parameters={'encoder_factor': factor})
 
 
 def _sensor_time_offset(s: Setting, rng: Rng) -> Change:
-    late = _draw(rng, s, (0.03, 0.05), (0.08, 0.13), (0.2, 0.35))
-    return Change(senses={'late': _pick(rng, 'imu', 'wheels', 'pose'), 'late_by': late},
+    late = draw(rng, s, (0.03, 0.05), (0.08, 0.13), (0.2, 0.35))
+    return Change(senses={'late': pick(rng, 'imu', 'wheels', 'pose'), 'late_by': late},
                   parameters={'late_by': late})
-
-
-# Outside the catalogue.
-
-def _wheel_eccentricity(s: Setting, rng: Rng) -> Change:
-    part = _draw(rng, s, (0.015, 0.025), (0.04, 0.06), (0.09, 0.14))
-    return Change({'eccentricity': part, 'eccentricity_phase': float(rng.uniform(0.5, 2.5))},
-                  side='both', parameters={'run_out_fraction': part})
-
-
-def _wavy_floor(s: Setting, rng: Rng) -> Change:
-    force = _draw(rng, s, (12.0, 18.0), (30.0, 45.0), (70.0, 100.0))
-    return Change({'undulation': force, 'undulation_pitch': float(rng.uniform(0.7, 1.6))},
-                  parameters={'force': force})
-
-
-def _reverse_gain(s: Setting, rng: Rng) -> Change:
-    part = _draw(rng, s, (0.05, 0.07), (0.12, 0.18), (0.25, 0.4)) * _sign(rng)
-    return Change({'reverse_gain': part}, parameters={'gain_change_fraction': part})
-
-
-def _motor_cogging(s: Setting, rng: Rng) -> Change:
-    torque = _draw(rng, s, (2.0, 3.0), (5.0, 8.0), (12.0, 20.0))
-    return Change({'cogging': torque, 'cogging_count': float(rng.integers(5, 14))},
-                  side='both', parameters={'torque': torque})
-
-
-def _wind_gusts(s: Setting, rng: Rng) -> Change:
-    force = _draw(rng, s, (12.0, 18.0), (28.0, 40.0), (60.0, 90.0))
-    return Change(gusts=force, parameters={'force_rms': force})
-
-
-def _command_stutter(s: Setting, rng: Rng) -> Change:
-    hold = _draw(rng, s, (0.2, 0.3), (0.4, 0.6), (0.8, 1.2))
-    return Change(command={'stutter_period': float(rng.uniform(2.0, 3.5)),
-                           'stutter_hold': hold}, parameters={'hold': hold})
-
-
-def _gyro_clipping(s: Setting, rng: Rng) -> Change:
-    rate = s.most_yaw * _draw(rng, s, (0.8, 0.9), (0.6, 0.7), (0.35, 0.5))
-    return Change(senses={'gyro_clip': rate}, parameters={'rate': rate})
-
-
-def _offset_mass(s: Setting, rng: Rng) -> Change:
-    ahead = _draw(rng, s, (0.05, 0.07), (0.1, 0.14), (0.18, 0.24)) * _sign(rng)
-    return Change({'centre_forward': ahead}, parameters={'centre_forward': ahead})
-
-
-def _periodic_cutback(s: Setting, rng: Rng) -> Change:
-    part = _draw(rng, s, (0.08, 0.12), (0.2, 0.3), (0.45, 0.6))
-    return Change(command={'cutback': part}, parameters={'cutback': part})
 
 
 BUILDERS: Mapping[str, Builder] = {
@@ -383,15 +259,7 @@ BUILDERS: Mapping[str, Builder] = {
     'gyro_sign': _gyro_sign,
     'encoder_scale': _encoder_scale,
     'sensor_time_offset': _sensor_time_offset,
-    'wheel_eccentricity': _wheel_eccentricity,
-    'wavy_floor': _wavy_floor,
-    'reverse_gain': _reverse_gain,
-    'motor_cogging': _motor_cogging,
-    'wind_gusts': _wind_gusts,
-    'command_stutter': _command_stutter,
-    'gyro_clipping': _gyro_clipping,
-    'offset_mass': _offset_mass,
-    'periodic_cutback': _periodic_cutback,
+    **outside.BUILDERS,
 }
 
 

@@ -119,8 +119,8 @@ def page_of(results: Json, pictures: str = 'pictures') -> str:
         f'![rates with intervals]({pictures}/proof_rates.png)', '',
         '## Held-out improvement', '',
         'Share = (error of the refitted plain model - error of the diagnosed model) / (error of '
-        'the plain model - error of the hidden robot itself without chance), on recordings that no '
-        'diagnosis saw. "all" puts wheel speeds, yaw rate and motion within one second '
+        'the plain model - error of the hidden robot itself without chance), on recordings '
+        'that no diagnosis saw. "all" puts wheel speeds, yaw rate and motion within one second '
         'together, "position_m" is the open-loop path over a whole recording.', '',
         _markdown(('cases', 'number', 'median', 'quartiles'), [
             [name, str(row['count']), _percent(row['median']),
