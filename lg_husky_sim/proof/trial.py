@@ -102,17 +102,27 @@ def prepare(folders: Folders, specs: Sequence[Spec], jobs: int,
         done('')
     if not missing:
         return sealed
+    for name, commitment in _made(folders, missing, jobs):
+        sealed[name] = commitment
+        write_json(folders.commitments, sealed)
+        done(name)
+    return sealed
+
+
+def _made(folders: Folders, missing: Sequence[tuple[Spec, str]],
+          jobs: int) -> Iterator[tuple[str, str]]:
+    """Generate cases, in this process with one job; yield names and commitments."""
+    if jobs == 1 or len(missing) == 1:
+        for spec, name in missing:
+            yield _generate(spec, name, folders)
+        return
     pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context('spawn'))
     try:
         waiting = [pool.submit(_generate, spec, name, folders) for spec, name in missing]
         for future in as_completed(waiting):
-            name, commitment = future.result()
-            sealed[name] = commitment
-            write_json(folders.commitments, sealed)
-            done(name)
+            yield future.result()
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-    return sealed
 
 
 def command_for(folders: Folders, name: str, out: Path) -> list[str]:

@@ -1,0 +1,109 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A whole trial: sealed first, blind, resumable, scored; with a diagnosis played by the test."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+import shutil
+
+from click.testing import CliRunner
+from lg_husky_sim.cli.prove import command
+from lg_husky_sim.errors import CommandError, LgHuskyError
+from lg_husky_sim.proof import trial
+from lg_husky_sim.proof.cases import Spec
+import pytest
+
+SPECS = (Spec(3, 'clean'), Spec(4, 'single', effects=('rolling_resistance',),
+                                severity='strong', onset='none'))
+
+
+@pytest.fixture(scope='module')
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> trial.Folders:
+    folders = trial.Folders(tmp_path_factory.mktemp('trial'))
+    trial.keep_plan(folders, SPECS)
+    trial.prepare(folders, SPECS, 1, lambda name: None)
+    return folders
+
+
+def play(monkeypatch: pytest.MonkeyPatch, folders: trial.Folders) -> list[list[str]]:
+    """Let every diagnosis say "rolling resistance", with a model as good as the truth."""
+    asked: list[list[str]] = []
+
+    def run(arguments: list[str]) -> tuple[int, str]:
+        asked.append(arguments)
+        out = Path(arguments[arguments.index('--out') + 1])
+        if 'diagnose' in arguments:
+            out.mkdir(parents=True)
+            (out / 'diagnosis.json').write_text(json.dumps({
+                'verdict': 'known', 'confidence': 0.99, 'findings': [{
+                    'effect': 'rolling_resistance', 'subsystem': 'translation'}]}))
+        else:
+            held = Path(arguments[arguments.index('--commands') + 1])
+            truth = held.with_name(held.name.replace('held', 'truth'))
+            shutil.copytree(truth, out)
+        return 0, ''
+
+    monkeypatch.setattr(trial, '_run', run)
+    return asked
+
+
+def test_a_trial_is_sealed_blind_resumed_and_scored(
+        prepared: trial.Folders, monkeypatch: pytest.MonkeyPatch) -> None:
+    sealed = json.loads(prepared.commitments.read_text())
+    assert sorted(sealed) == ['case_0001', 'case_0002']
+    asked = play(monkeypatch, prepared)
+    done = list(trial.diagnose_all(prepared, sorted(sealed), 2))
+    assert len(done) == 2
+    for arguments in asked:
+        if 'diagnose' in arguments:
+            given = ' '.join(arguments)
+            assert 'answers' not in given
+            assert 'held' not in given
+            assert 'rolling' not in given
+    clean, single = trial.open_and_judge(prepared, sealed, sorted(sealed))
+    assert (clean.kind, clean.verdict, single.top1) == ('clean', 'known', True)
+    assert single.shares['all'] == pytest.approx(1.0)
+    before = len(asked)
+    assert len(list(trial.diagnose_all(prepared, sorted(sealed), 2))) == 2
+    assert len(asked) == before, 'a resumed trial asks nothing again'
+
+
+def test_preparing_again_makes_nothing_new(prepared: trial.Folders) -> None:
+    path = prepared.cases / 'case_0001/recordings/rec1/metadata.yaml'
+    before = path.stat().st_mtime_ns
+    trial.prepare(prepared, SPECS, 1, lambda name: None)
+    assert path.stat().st_mtime_ns == before
+
+
+def test_a_folder_holds_one_trial(prepared: trial.Folders) -> None:
+    trial.keep_plan(prepared, SPECS)
+    with pytest.raises(CommandError, match='holds another trial'):
+        trial.keep_plan(prepared, SPECS[:1])
+
+
+def test_a_case_without_outcome_is_not_scored(prepared: trial.Folders) -> None:
+    with pytest.raises(LgHuskyError, match='case_0009 has no outcome yet'):
+        trial.open_and_judge(prepared, {}, ['case_0009'])
+
+
+def test_the_command_line_names_baselines_and_recordings(tmp_path: Path) -> None:
+    folders = trial.Folders(tmp_path)
+    for name in ('recordings/rec1', 'recordings/rec2', 'baseline/base1'):
+        (folders.cases / 'case_0001' / name).mkdir(parents=True)
+    line = trial.command_for(folders, 'case_0001', tmp_path / 'out')
+    assert [Path(part).name for part in line[4:6]] == ['rec1', 'rec2']
+    assert Path(line[line.index('--baseline') + 1]).name == 'base1'
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['--report', '--seed', '5'], 'seed = 5 is a tuning seed; a report needs 10000 or more'),
+    (['--seed', '9999', '--cases', '2'], 'reach the reporting seeds'),
+])
+def test_seeds_of_the_other_kind_are_refused(tmp_path: Path, arguments: list[str],
+                                             message: str) -> None:
+    result = CliRunner().invoke(command, [*arguments, '--out', str(tmp_path / 'out')])
+    assert isinstance(result.exception, CommandError)
+    assert message in str(result.exception)
+    assert not (tmp_path / 'out').exists()
