@@ -48,8 +48,10 @@ class Discovery:
         """
         if self.range == 'SYSTEM_DEFAULT':
             return extra
-        general = ('' if self.range == 'SUBNET'
-                   else '<General><AllowMulticast>false</AllowMulticast></General>')
+        general = ''
+        if self.range != 'SUBNET':
+            listened = self._interfaces() if self.range == 'LOCALHOST' and not extra else ''
+            general = f'<General>{listened}<AllowMulticast>false</AllowMulticast></General>'
         if self.range == 'OFF':
             tag = os.getpid() if pid is None else pid
             inner = ('<ParticipantIndex>none</ParticipantIndex>'
@@ -63,6 +65,12 @@ class Discovery:
         text = (f'<CycloneDDS><Domain>{general}<Discovery>{inner}</Discovery></Domain>'
                 '</CycloneDDS>')
         return f'{text},{extra}' if extra else text
+
+    def _interfaces(self) -> str:
+        # Cyclone from 11 on drops what arrives at an interface that it has not chosen, and
+        # peers of older versions ask for localhost at the loopback interface only.
+        away = '<NetworkInterface autodetermine="true"/>' if self.peers else ''
+        return f'<Interfaces>{away}<NetworkInterface address="127.0.0.1"/></Interfaces>'
 
 
 def read_discovery(environment: Mapping[str, str]) -> Discovery:

@@ -98,4 +98,6 @@ def sample_type(name: str, *, header: bool = False) -> type[RawSample]:
     made: Any = make_idl_struct(f'{name.replace("/", "_")}_raw_', dds_type_name(name), fields,
                                 dataclassify=False)
     made.__init__, made.serialize, made.deserialize = _keep, _give, classmethod(_take)
+    # What comes of a writer that has gone: no fields, and no key in ROS types.
+    made.deserialize_key = classmethod(_take)
     return cast('type[RawSample]', made)
