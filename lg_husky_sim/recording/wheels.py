@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 import re
 
 from lg_husky_sim.signals import FloatArray
@@ -37,6 +38,11 @@ def wheel_sides(names: Sequence[str], count: int) -> Sides | None:
     tuple of two tuples of int, or None
         Places of the left and of the right wheels; None if one side has none.
     """
+    return _sides(tuple(names), count)
+
+
+@lru_cache(maxsize=256)
+def _sides(names: tuple[str, ...], count: int) -> Sides | None:
     if not names:
         return NAMELESS.get(count)
     driven = [(place, name.lower()) for place, name in enumerate(names)
