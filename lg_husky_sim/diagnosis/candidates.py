@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import itertools
+import math
 
 from lg_husky_sim.husky.effects import Effect, catalogue
 from lg_husky_sim.husky.model import Structure
@@ -21,9 +22,11 @@ RECALIBRATED: Mapping[str, float | None] = {
     'mass': None, 'yaw_inertia': None, 'wheel_inertia': None, 'motor_resistance': None,
     'torque_constant': None, 'wheel_radius': 0.02, 'track': 0.02,
 }
-#: Small unknowns of every observation: name, standard deviation.
-EXTRAS = (('latency', 0.008), ('delay_wheels', 0.008), ('delay_imu', 0.008),
-          ('delay_pose', 0.008), ('gyro_bias', 0.003))
+#: Deviations that a recalibration may use up.
+REACH = 2.5
+#: Small unknowns of every observation: name, standard deviation, largest size.
+EXTRAS = (('latency', 0.008, 0.02), ('delay_wheels', 0.008, 0.02), ('delay_imu', 0.008, 0.02),
+          ('delay_pose', 0.008, 0.02), ('gyro_bias', 0.002, 0.005))
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,7 @@ def nuisance(parameters: Parameters, structure: Structure, channels: tuple[str, 
     -------
     tuple of Unknown
     """
-    unknowns = [nominal_unknown(parameters.entry(name), deviation)
+    unknowns = [_within(nominal_unknown(parameters.entry(name), deviation))
                 for name, deviation in RECALIBRATED.items()]
     ids = {effect.id for effect in structure.effects}
     shapes = {effect.shape for effect in structure.effects if effect.id == 'sensor_time_offset'}
@@ -125,11 +128,20 @@ def nuisance(parameters: Parameters, structure: Structure, channels: tuple[str, 
                             ('pose', ('advance', 'turn'))):
         if stream in shapes or not set(members) & set(channels):
             absent.add(f'delay_{stream}')
-    for name, deviation in EXTRAS:
+    for name, deviation, largest in EXTRAS:
         if name not in absent:
-            step = 0.003 if name.startswith(('delay', 'latency')) else 0.002
-            unknowns.append(Unknown(name, False, 0.0, deviation, -0.03, 0.03, step, extra=True))
+            unknowns.append(Unknown(name, False, 0.0, deviation, -largest, largest,
+                                    0.2 * largest, extra=True))
     return tuple(unknowns)
+
+
+def _within(unknown: Unknown) -> Unknown:
+    # Bounds at a few deviations: what lies beyond is no recalibration.
+    if not math.isfinite(unknown.deviation):
+        return unknown
+    reach = REACH * unknown.deviation
+    return replace(unknown, lower=max(unknown.lower, math.exp(unknown.centre - reach)),
+                   upper=min(unknown.upper, math.exp(unknown.centre + reach)))
 
 
 def neutral(name: str) -> float:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lg_husky_sim.diagnosis.candidates import (
-    Candidate, candidates, effect_entries, effect_unknowns, nuisance)
+    RECALIBRATED, Candidate, candidates, effect_entries, effect_unknowns, nuisance)
 from lg_husky_sim.diagnosis.screening import (
     Onsets, Projector, Score, Signature, place_onsets, scan, signatures_of, time_onsets)
 from lg_husky_sim.errors import LgHuskyError
@@ -31,14 +31,16 @@ from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 
 #: Candidates that are refitted in a round.
-SERIOUS = 7
+SERIOUS = 6
+#: Of these, those that are refitted to the end.
+POLISHED = 4
 #: Folds and block length of the held-out gain [s].
 FOLDS = 4
 BLOCK = 5.0
 #: Least held-out gain of an adopted effect [nats].
-LEAST_GAIN = 12.0
+LEAST_GAIN = 18.0
 #: Least share of the unexplained energy that the first and a further effect must explain.
-LEAST_SHARE = (0.03, 0.1)
+LEAST_SHARE = (0.01, 0.2)
 #: Most effects that are named.
 MOST = 3
 
@@ -147,7 +149,8 @@ def _silent(text: str, share: float) -> None:
 
 def fit_structure(observations: Observations, structure: Structure, nominal: Parameters,
                   metric_: Metric, start: Mapping[str, float],
-                  effects: Mapping[str, float], steps: int = 8) -> Fit | None:
+                  effects: Mapping[str, float], steps: int = 8, near: Fit | None = None,
+                  polish: bool = True) -> Fit | None:
     """
     Refit a structure: the recalibration together with the parameters of its effects.
 
@@ -163,6 +166,10 @@ def fit_structure(observations: Observations, structure: Structure, nominal: Par
     effects : mapping of str to float
         Sizes of the effects' parameters, to scale their steps.
     steps : int
+    near : Fit, optional
+        A fit without the last effect, whose derivatives serve meanwhile.
+    polish : bool
+        Whether to end with derivatives at the estimate.
 
     Returns
     -------
@@ -180,11 +187,23 @@ def fit_structure(observations: Observations, structure: Structure, nominal: Par
         return None
     parameters = nominal.with_entries(*entries)
     problem = Problem(observations, model, parameters, metric_, unknowns)
-    solution = solve(problem, {**effects, **start}, steps=steps)
+    known = None if near is None else _columns(near, unknowns)
+    solution = solve(problem, {**effects, **start}, steps=steps, known=known, polish=polish)
     if solution is None:
         return None
     inner = {u.name: solution.values[u.name] for u in unknowns if not u.extra}
     return Fit(structure, parameters.replacing(inner), solution)
+
+
+def _columns(near: Fit, unknowns: Sequence[Unknown]) -> FloatArray:
+    # Derivatives of a nearby fit by those of the unknowns that it has: always the first ones.
+    have = {u.name: i for i, u in enumerate(near.solution.unknowns)}
+    chosen = []
+    for unknown in unknowns:
+        if unknown.name not in have:
+            break
+        chosen.append(have[unknown.name])
+    return near.solution.jacobian[:, chosen]
 
 
 def extras_of(fit: Fit) -> dict[str, float]:
@@ -269,7 +288,8 @@ def held_out_cost(observations: Observations, fit: Fit, metric_: Metric, folds: 
     """
     Return half the squared whitened residual of each value when its fold is not fitted.
 
-    One linear step from the full estimate stands for the refit without a fold.
+    One linear step from the full estimate, where the gradient vanishes, stands for the refit
+    without a fold.
 
     Parameters
     ----------
@@ -286,18 +306,14 @@ def held_out_cost(observations: Observations, fit: Fit, metric_: Metric, folds: 
     white = metric_.whiten(observations, observations.measured - solution.predicted)
     slope = metric_.whiten(observations, solution.jacobian)
     deviations = np.array([u.deviation for u in solution.unknowns])
-    varied = np.array([u.varied(solution.values[u.name]) for u in solution.unknowns])
-    centres = np.array([u.centre for u in solution.unknowns])
     weights = 1.0 / deviations ** 2
-    pull = np.where(np.isfinite(deviations), (varied - centres) * weights, 0.0)
     cost = np.zeros(white.size)
     for fold in range(FOLDS):
         out = folds == fold
-        inside = slope[~out]
+        inside, own = slope[~out], slope[out]
         curvature = inside.T @ inside + np.diag(weights)
-        curvature += 1e-9 * np.diag(np.diag(curvature)) + 1e-12 * np.eye(len(varied))
-        move = np.linalg.solve(curvature, inside.T @ white[~out] - pull)
-        left = white[out] - slope[out] @ move
+        curvature += 1e-6 * np.diag(np.diag(curvature)) + 1e-12 * np.eye(curvature.shape[0])
+        left = white[out] + own @ np.linalg.solve(curvature, own.T @ white[out])
         cost[out] = 0.5 * left ** 2
     return cost
 
@@ -320,7 +336,7 @@ def _sized(score: Score) -> dict[str, float]:
 
 
 def refit(observations: Observations, base: Fit, nominal: Parameters, score: Score,
-          metric_: Metric, steps: int = 5) -> Fit | None:
+          metric_: Metric, steps: int = 2, start: Fit | None = None) -> Fit | None:
     """
     Put a scored candidate into the base and refit everything.
 
@@ -332,6 +348,8 @@ def refit(observations: Observations, base: Fit, nominal: Parameters, score: Sco
     score : Score
     metric_ : Metric
     steps : int
+    start : Fit, optional
+        Where an earlier, shorter refit of the same candidate ended; it is then polished.
 
     Returns
     -------
@@ -345,8 +363,10 @@ def refit(observations: Observations, base: Fit, nominal: Parameters, score: Sco
     sized = _sized(score)
     sizes = {**{name: base.parameters[name] for e in base.structure.effects
                 for name in (p.name for p in e.parameters())}, **sized}
-    start = {**base.solution.values, **sized}
-    return fit_structure(observations, structure, nominal, metric_, start, sizes, steps)
+    begin = {**base.solution.values, **sized} if start is None else dict(start.solution.values)
+    near = base if start is None else None
+    return fit_structure(observations, structure, nominal, metric_, begin, sizes, steps,
+                         near, polish=start is not None)
 
 
 def search(observations: Observations, structure: Structure, nominal: Parameters,
@@ -412,16 +432,26 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
                                          observations, base.solution.predicted)]
     common = shared_metric(observations, base, signatures)
     residual = observations.measured - base.solution.predicted
-    unknowns = base.solution.unknowns
-    deviations = np.array([u.deviation for u in unknowns])
-    pull = np.array([(u.centre - u.varied(base.solution.values[u.name])) / u.deviation
-                     for u in unknowns])
-    projector = Projector(observations, common, residual, base.solution.jacobian, deviations,
-                          pull)
     late = base.structure.onset is None
-    scores = scan(projector, signatures, masks if late else ())
-    serious = _serious(scores)
-    fits = [(score, refit(observations, base, nominal, score, common)) for score in serious]
+    scores = screen(observations, base, common, signatures, masks if late else ())
+    plain_metric = Metric(common.scale, {name: np.ones(1) for name in common.filters})
+    broad = screen(observations, base, plain_metric, signatures, masks if late else ())
+    serious = _serious(scores, SERIOUS)
+    chosen = {(s.signature.candidate.label, s.onset is None) for s in serious}
+    serious += [s for s in _serious(broad, SERIOUS // 2)
+                if (s.signature.candidate.label, s.onset is None) not in chosen]
+    nominal_fit = at_nominal(observations, base, nominal)
+    quick = []
+    for score in serious:
+        tries = [refit(observations, near, nominal, score, common)
+                 for near in (base, nominal_fit) if near is not None]
+        best_try = min((t for t in tries if t is not None),
+                       key=lambda t: t.solution.cost, default=None)
+        if best_try is not None:
+            quick.append((score, best_try))
+    near = sorted(quick, key=lambda pair: pair[1].solution.cost)[:POLISHED]
+    fits = [(score, refit(observations, base, nominal, score, common, 4, fit))
+            for score, fit in near]
     usable = [(score, fit) for score, fit in fits if fit is not None]
     rebased = fit_structure(observations, base.structure, nominal, common,
                             base.solution.values, base.parameters) or base
@@ -448,7 +478,64 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted)
 
 
-def _serious(scores: Sequence[Score]) -> list[Score]:
+def screen(observations: Observations, base: Fit, metric_: Metric,
+           signatures: Sequence[Signature], masks: Sequence[Onsets]) -> list[Score]:
+    """
+    Score all signatures under one metric.
+
+    Parameters
+    ----------
+    observations : Observations
+    base : Fit
+    metric_ : Metric
+    signatures : sequence of Signature
+    masks : sequence of Onsets
+
+    Returns
+    -------
+    list of Score
+        Best first.
+    """
+    unknowns = base.solution.unknowns
+    deviations = np.array([u.deviation for u in unknowns])
+    pull = np.array([(u.centre - u.varied(base.solution.values[u.name])) / u.deviation
+                     for u in unknowns])
+    projector = Projector(observations, metric_, observations.measured - base.solution.predicted,
+                          base.solution.jacobian, deviations, pull)
+    return scan(projector, signatures, masks)
+
+
+def at_nominal(observations: Observations, base: Fit, nominal: Parameters) -> Fit | None:
+    """
+    Return the base's structure with the nominal parameters, where it is far from them.
+
+    A large missing effect drives a recalibration into places from which the right refit cannot
+    be reached; the nominal parameters are then the better start.
+
+    Parameters
+    ----------
+    observations : Observations
+    base : Fit
+    nominal : Parameters
+
+    Returns
+    -------
+    Fit or None
+        None where the recalibration has hardly moved.
+    """
+    solution = base.solution
+    start = {u.name: u.value(u.centre) if u.extra or u.name in RECALIBRATED
+             else solution.values[u.name] for u in solution.unknowns}
+    if all(abs(u.varied(solution.values[u.name]) - u.varied(start[u.name]))
+           < (0.3 if u.logarithmic else 1.5 * u.deviation) for u in solution.unknowns):
+        return None
+    order = {name: np.ones(1) for name in observations.channels}
+    metric_ = Metric(np.ones(observations.measured.size), order)
+    return fit_structure(observations, base.structure, nominal, metric_, start,
+                         base.parameters, steps=0)
+
+
+def _serious(scores: Sequence[Score], most: int) -> list[Score]:
     # The best few, at most two variants of one effect; an onset only where it clearly helps.
     plain = {s.signature.candidate.label: s.gain for s in scores if s.onset is None}
     chosen: list[Score] = []
@@ -462,6 +549,6 @@ def _serious(scores: Sequence[Score]) -> list[Score]:
             continue
         counts[name] = counts.get(name, 0) + 1
         chosen.append(score)
-        if len(chosen) >= SERIOUS:
+        if len(chosen) >= most:
             break
     return chosen

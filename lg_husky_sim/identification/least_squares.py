@@ -14,6 +14,7 @@ from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import EffectParameter
 from lg_husky_sim.husky.model import HuskyModel
 from lg_husky_sim.husky.parameters import Parameter, Parameters
+from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
@@ -52,7 +53,7 @@ class Unknown:
 
     def varied(self, value: float) -> float:
         """Return the varied quantity of a value."""
-        return math.log(value) if self.logarithmic else value
+        return math.log(max(value, self.lower)) if self.logarithmic else value
 
     def value(self, varied: float) -> float:
         """Return the number for a varied quantity, inside the bounds."""
@@ -133,17 +134,22 @@ class Problem:
         self.parameters = parameters
         self.metric = metric
         self.unknowns = tuple(unknowns)
+        self._simulated: tuple[tuple[float, ...], Plant, tuple[FloatArray, ...]] | None = None
 
     def predict(self, varied: FloatArray) -> FloatArray | None:
         """Return the prediction, or None where the model cannot be evaluated there."""
         values = {u.name: u.value(float(v)) for u, v in zip(self.unknowns, varied, strict=True)}
         extra = {u.name: values[u.name] for u in self.unknowns if u.extra}
         inner = {u.name: values[u.name] for u in self.unknowns if not u.extra}
-        try:
-            plant = self.model.at(self.parameters.replacing(inner))
-        except (ParameterError, ArithmeticError, np.linalg.LinAlgError):
-            return None
-        predicted = self.observations.predict(plant, extra)
+        latency = extra.get('latency', 0.0)
+        key = (*inner.values(), latency)
+        if self._simulated is None or self._simulated[0] != key:
+            try:
+                plant = self.model.at(self.parameters.replacing(inner))
+            except (ParameterError, ArithmeticError, np.linalg.LinAlgError):
+                return None
+            self._simulated = (key, plant, self.observations.simulate(plant, latency))
+        predicted = self.observations.observe(self._simulated[1], self._simulated[2], extra)
         return predicted if np.all(np.isfinite(predicted)) and (
             np.max(np.abs(predicted), initial=0.0) < 1e6) else None
 
@@ -164,28 +170,52 @@ class Problem:
         prior = self.prior(varied)
         return data + 0.5 * float(prior @ prior), data
 
-    def jacobian(self, varied: FloatArray, predicted: FloatArray) -> FloatArray:
-        """Return forward differences (backward at an upper bound), shape (n_values, n)."""
-        columns = []
-        for i, unknown in enumerate(self.unknowns):
-            column = None
-            for step in (unknown.step, -unknown.step):
-                moved = np.array(varied)
-                moved[i] += step
-                inside = unknown.value(float(moved[i]))
-                if abs(unknown.varied(inside) - moved[i]) > 1e-3 * abs(step):
-                    continue
-                there = self.predict(moved)
-                if there is not None:
-                    column = (there - predicted) / step
-                    break
-            columns.append(np.zeros(predicted.size) if column is None else column)
+    def jacobian(self, varied: FloatArray, predicted: FloatArray,
+                 known: FloatArray | None = None) -> FloatArray:
+        """
+        Return forward differences (backward at an upper bound).
+
+        Parameters
+        ----------
+        varied : numpy.ndarray, shape (n_unknowns,)
+        predicted : numpy.ndarray, shape (n_values,)
+        known : numpy.ndarray, shape (n_values, n_known), optional
+            Columns of the first unknowns, taken over from a point nearby.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_values, n_unknowns)
+        """
+        columns = [] if known is None else [*known.T]
+        # Extras of the observation first: they need no new simulation.
+        order = sorted(range(len(columns), len(self.unknowns)),
+                       key=lambda i: not self.unknowns[i].extra)
+        found: dict[int, FloatArray] = {}
+        if any(self.unknowns[i].extra for i in order):
+            self.predict(varied)
+        for i in order:
+            found[i] = self._column(i, varied, predicted)
+        columns.extend(found[i] for i in sorted(found))
         return np.column_stack(columns) if columns else np.zeros((predicted.size, 0))
+
+    def _column(self, i: int, varied: FloatArray, predicted: FloatArray) -> FloatArray:
+        unknown = self.unknowns[i]
+        for step in (unknown.step, -unknown.step):
+            moved = np.array(varied)
+            moved[i] += step
+            inside = unknown.value(float(moved[i]))
+            if abs(unknown.varied(inside) - moved[i]) > 1e-3 * abs(step):
+                continue
+            there = self.predict(moved)
+            if there is not None:
+                column: FloatArray = (there - predicted) / step
+                return column
+        return np.zeros(predicted.size)
 
 
 def solve(problem: Problem, start: Mapping[str, float], steps: int = 12,
-          tolerance: float = 0.02,
-          progress: Callable[[], None] | None = None) -> Solution | None:
+          tolerance: float = 0.02, progress: Callable[[], None] | None = None,
+          known: FloatArray | None = None, polish: bool = True) -> Solution | None:
     """
     Minimise the whitened residuals.
 
@@ -200,6 +230,10 @@ def solve(problem: Problem, start: Mapping[str, float], steps: int = 12,
         Gain of a step below which the search has converged [nats].
     progress : callable, optional
         Called once a step.
+    known : numpy.ndarray, shape (n_values, n_known), optional
+        Derivatives by the first unknowns at a point nearby; they are kept.
+    polish : bool
+        Whether to take all derivatives anew at the end.
 
     Returns
     -------
@@ -215,7 +249,7 @@ def solve(problem: Problem, start: Mapping[str, float], steps: int = 12,
         return None
     cost, data = problem.cost(predicted, varied)
     damping, done, taken = 1e-3, False, 0
-    jacobian = problem.jacobian(varied, predicted)
+    jacobian = problem.jacobian(varied, predicted, known)
     while taken < steps and not done and problem.unknowns:
         taken += 1
         if progress is not None:
@@ -246,8 +280,10 @@ def solve(problem: Problem, start: Mapping[str, float], steps: int = 12,
         if not better:
             done = True
             break
-        if not done or taken == 1:
-            jacobian = problem.jacobian(varied, predicted)
+        if not done:
+            jacobian = problem.jacobian(varied, predicted, known)
+    if polish:
+        jacobian = problem.jacobian(varied, predicted)
     values = {u.name: u.value(float(v)) for u, v in zip(problem.unknowns, varied, strict=True)}
     bound = tuple(u.name for u in problem.unknowns if values[u.name] <= u.lower * (
         1.0 + 1e-9 * math.copysign(1.0, u.lower)) or values[u.name] >= u.upper * (1.0 - 1e-9))

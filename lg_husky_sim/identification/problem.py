@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 import math
 
 import numpy as np
@@ -175,20 +176,63 @@ class Observations:
         numpy.ndarray, shape (n_values,)
         """
         given = extra or {}
-        simulators: dict[str, Simulator] = {}
-        parts = []
+        return self.observe(plant, self.simulate(plant, given.get('latency', 0.0)), given)
+
+    def simulate(self, plant: Plant, latency: float = 0.0) -> tuple[FloatArray, ...]:
+        """
+        Simulate every piece.
+
+        Parameters
+        ----------
+        plant : Plant
+        latency : float
+            Further dead time of the commands [s].
+
+        Returns
+        -------
+        tuple of numpy.ndarray, shape (count + 1, 15)
+            The kernel's columns, a piece each.
+        """
+        simulators: dict[int, Simulator] = {}
+        grids = []
         for piece in self.pieces:
-            if piece.recording not in simulators:
-                own = self.plant_in(plant, piece.recording)
-                same = [s for s in simulators.values() if s.plant is own]
-                simulators[piece.recording] = same[0] if same else Simulator(
-                    own, PERIOD, fine_pose=False)
-            simulator = simulators[piece.recording]
-            grid = simulate_piece(simulator, piece, given.get('latency', 0.0))
-            parts.append(_observe(piece, simulator.plant, grid, given))
+            number = self._regime(plant, piece.recording)
+            if number not in simulators:
+                simulators[number] = Simulator(self.plant_in(plant, piece.recording), PERIOD,
+                                               fine_pose=False)
+            grids.append(simulate_piece(simulators[number], piece, latency))
+        return tuple(grids)
+
+    def observe(self, plant: Plant, grids: Sequence[FloatArray],
+                extra: Mapping[str, float] | None = None) -> FloatArray:
+        """
+        Return what the sensors read of simulated pieces.
+
+        Parameters
+        ----------
+        plant : Plant
+        grids : sequence of numpy.ndarray
+            Of :meth:`simulate`.
+        extra : mapping of str to float, optional
+            As in :meth:`predict`.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_values,)
+        """
+        parts = [_observe(piece, self.plant_in(plant, piece.recording), grid, extra or {})
+                 for piece, grid in zip(self.pieces, grids, strict=True)]
         return np.concatenate(parts) if parts else np.zeros(0)
 
-    @property
+    def _regime(self, plant: Plant, recording: str) -> int:
+        # 0 in or without the onset's recording, -1 before it, 1 after it.
+        if plant.onset is None or plant.onset.recording not in self.recordings:
+            return 0
+        names = self.recordings
+        own, other = names.index(recording), names.index(plant.onset.recording)
+        return (own > other) - (own < other)
+
+    @cached_property
     def recordings(self) -> tuple[str, ...]:
         """Names of the recordings in their order."""
         return tuple(dict.fromkeys(piece.recording for piece in self.pieces))
@@ -223,9 +267,7 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0) -> 
         The kernel's columns; pose columns follow the measured pose at the resets.
     """
     commands = piece.commands
-    if latency:
-        commands = TimeSeries(commands.times + latency, commands.values, commands.names)
-    held = hold(commands, piece.start, PERIOD, piece.count)
+    held = _held(piece, latency)
     state = simulator.initial(_pose_at(piece.pose, piece.start), piece.twist, piece.start,
                               piece.wheel_rates, piece.wheel_angles)
     flat = np.array(state.flat)
@@ -242,6 +284,14 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0) -> 
         run(flat, held[first:last], out[first + 1:last + 1],
             *simulator.operators.arguments)  # type: ignore[arg-type]
     return out
+
+
+@lru_cache(maxsize=256)
+def _held(piece: Piece, latency: float) -> FloatArray:
+    commands = piece.commands
+    if latency:
+        commands = TimeSeries(commands.times + latency, commands.values, commands.names)
+    return hold(commands, piece.start, PERIOD, piece.count)
 
 
 def _fill_command(flat: FloatArray, n: int, held: FloatArray) -> None:

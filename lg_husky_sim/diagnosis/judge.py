@@ -1,0 +1,155 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From a search to an answer: names, numbers, rivals and what cannot be told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from lg_husky_sim.diagnosis.candidates import candidates
+from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
+from lg_husky_sim.diagnosis.regimes import where_it_shows
+from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry
+from lg_husky_sim.diagnosis.search import (
+    Rival, Round, Search, folds_of, held_out_cost)
+from lg_husky_sim.diagnosis.separation import separated_by
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.parameters import Parameters
+
+#: A rival within this share of the winner's held-out gain, or this many nats, is as good.
+NEAR_SHARE = 0.06
+NEAR_NATS = 10.0
+
+
+def onset_words(onset: Onset | None) -> str:
+    """Return an onset in words, with a leading comma; empty without one."""
+    if onset is None:
+        return ''
+    if onset.kind is OnsetKind.TIME:
+        where = f' of {onset.recording}' if onset.recording else ' of each recording'
+        return f', from {onset.value:.1f} s{where} on'
+    side = 'above' if onset.kind is OnsetKind.PLACE_ABOVE else 'below'
+    return f', where x is {side} {onset.value:.2f} m'
+
+
+def in_words(numbers: Sequence[Estimate]) -> str:
+    """Return estimates as text with their intervals."""
+    return ', '.join(
+        f'{e.name.replace("_", " ")} {e.value:.3g}{"" if e.unit == "1" else " " + e.unit} '
+        f'({e.low:.3g} to {e.high:.3g})' for e in numbers)
+
+
+def _side_words(effect: Effect) -> str:
+    return '' if effect.side in ('none', '') else {
+        'both': ' (both sides)', 'left': ' (left side)', 'right': ' (right side)'}[effect.side]
+
+
+def is_near(rival: Rival, best: Rival) -> bool:
+    """Return whether a rival explains held-out data about as well as the best."""
+    return rival.held_out > best.held_out - max(NEAR_NATS, NEAR_SHARE * best.held_out)
+
+
+def _rivals(one: Round, named: Effect) -> tuple[Rivalry, ...]:
+    return tuple(Rivalry(r.effect.id, r.effect.side, r.held_out)
+                 for r in one.rivals if r.effect.id != named.id)
+
+
+def findings(search: Search) -> tuple[Finding, ...]:
+    """
+    Return what was adopted, strongest first.
+
+    Parameters
+    ----------
+    search : Search
+
+    Returns
+    -------
+    tuple of Finding
+        Numbers and intervals from the joint fit of all of them.
+    """
+    observations, found = search.observations, []
+    hypotheses = len(candidates())
+    folds = folds_of(observations)
+    for one in (r for r in search.rounds if r.adopted):
+        best = one.rivals[0]
+        effect = best.effect
+        names = [p.name for p in effect.parameters() if not p.fixed]
+        final = search.final
+        numbers = estimates(observations, final, one.metric, names)
+        gain = held_out_cost(observations, one.base, one.metric, folds) - held_out_cost(
+            observations, best.fit, one.metric, folds)
+        regime = where_it_shows(observations, gain)
+        statement = (f'{effect.kind.title}{_side_words(effect)}{onset_words(best.onset)}: '
+                     f'{in_words(numbers)}. It shows {regime} and explains '
+                     f'{100.0 * min(max(one.share, 0.0), 1.0):.0f} % of what was unexplained.')
+        found.append(Finding(
+            effect.id, effect.side, effect.kind.subsystem.value, effect.kind.elements, regime,
+            final.structure.onset if effect.late or best.onset else None, numbers,
+            best.held_out, p_value(best.gain, len(names), hypotheses), one.share,
+            _rivals(one, effect), statement[0].upper() + statement[1:]))
+    return tuple(found)
+
+
+def indistinguishable(search: Search, nominal: Parameters) -> tuple[Indistinguishable, ...]:
+    """
+    Return the sets of effects between which the data do not decide.
+
+    Parameters
+    ----------
+    search : Search
+    nominal : Parameters
+
+    Returns
+    -------
+    tuple of Indistinguishable
+        A set for each adopted effect with rivals that explain held-out data about as well.
+    """
+    del nominal
+    found = []
+    for one in (r for r in search.rounds if r.adopted):
+        best = one.rivals[0]
+        near = [r for r in one.rivals[1:] if r.effect.id != best.effect.id and is_near(r, best)]
+        if near:
+            names = tuple(dict.fromkeys([best.effect.id, *(r.effect.id for r in near)]))
+            sensors, manoeuvres = separated_by(names)
+            found.append(Indistinguishable(names, sensors, manoeuvres))
+    return tuple(found)
+
+
+def confidence(search: Search) -> float:
+    """
+    Return how sure the verdict and the first name are.
+
+    Parameters
+    ----------
+    search : Search
+
+    Returns
+    -------
+    float
+        Between 0 and 1.
+    """
+    first = search.rounds[0]
+    if not first.adopted:
+        strongest = max((r.held_out for r in first.rivals), default=0.0)
+        return float(1.0 / (1.0 + np.exp((strongest - 8.0) / 6.0)))
+    by_name: dict[str, float] = {}
+    for rival in first.rivals:
+        by_name[rival.effect.id] = max(by_name.get(rival.effect.id, -np.inf), rival.held_out)
+    gains = sorted(by_name.values(), reverse=True)
+    return name_confidence(gains)
+
+
+def recalibration(search: Search, nominal: Parameters) -> tuple[Estimate, ...]:
+    """Return the nominal parameters as the final fit has them, with intervals."""
+    names = [u.name for u in search.final.solution.unknowns
+             if not u.extra and u.name in nominal]
+    return estimates(search.observations, search.final, search.rounds[-1].metric, names)
+
+
+def moved(numbers: Sequence[Estimate], nominal: Mapping[str, float]) -> tuple[Estimate, ...]:
+    """Return those whose interval leaves the nominal value out by more than a twentieth."""
+    return tuple(e for e in numbers if not e.low <= nominal[e.name] <= e.high
+                 and abs(e.value - nominal[e.name]) > 0.05 * abs(nominal[e.name]))

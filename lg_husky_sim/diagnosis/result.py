@@ -1,0 +1,237 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis says, as values and as ``diagnosis.json``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import enum
+import math
+from typing import Any
+
+from lg_husky_sim.husky.effects import Onset, OnsetKind
+from lg_husky_sim.husky.model_file import ModelFile
+
+SCHEMA = 'lg_husky_sim/diagnosis/1'
+
+
+class Verdict(enum.Enum):
+    """What a diagnosis ends in."""
+
+    NOTHING_MISSING = 'nothing_missing'
+    KNOWN = 'known'
+    UNKNOWN = 'unknown'
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """
+    One number of a finding.
+
+    Parameters
+    ----------
+    name : str
+    value, low, high : float
+        Estimate and 95 % interval [unit].
+    unit : str
+    """
+
+    name: str
+    value: float
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Rivalry:
+    """A rival of a finding with its held-out gain [nats]."""
+
+    effect: str
+    side: str
+    held_out_gain: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """
+    One thing that is missing.
+
+    Parameters
+    ----------
+    effect : str
+        Id of the catalogue, or ``unknown``.
+    side : str
+        left, right, both or none.
+    subsystem : str
+    elements : tuple of str
+        Of the linear graph.
+    regime : str
+        When it shows, in words.
+    onset : Onset or None
+    parameters : tuple of Estimate
+    held_out_gain : float
+        On blocks that were not fitted [nats].
+    p_value : float
+        Of the drop of the sum of squares, corrected for the number of hypotheses.
+    share : float
+        Share of the unexplained energy that it explains.
+    rivals : tuple of Rivalry
+    statement : str
+        One plain sentence with numbers.
+    """
+
+    effect: str
+    side: str
+    subsystem: str
+    elements: tuple[str, ...]
+    regime: str
+    onset: Onset | None
+    parameters: tuple[Estimate, ...]
+    held_out_gain: float
+    p_value: float
+    share: float
+    rivals: tuple[Rivalry, ...]
+    statement: str
+
+
+@dataclass(frozen=True)
+class Indistinguishable:
+    """Effects that the data cannot tell apart, and what would."""
+
+    effects: tuple[str, ...]
+    sensors: tuple[str, ...]
+    manoeuvres: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """A stretch of a recording where the plain model is off in a channel."""
+
+    recording: str
+    channel: str
+    start: float
+    end: float
+    strength: float
+    subsystem: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """
+    The whole answer.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    confidence : float
+        Probability that the verdict and the first name are right, by the evidence.
+    findings : tuple of Finding
+    indistinguishable : tuple of Indistinguishable
+    mismatch : tuple of Mismatch
+        Strongest first.
+    recalibration : tuple of Estimate
+        Nominal parameters that moved, with intervals.
+    plain, augmented : mapping of str to float
+        Root mean square errors on all data.
+    held_out_plain, held_out_augmented : mapping of str to float
+        The same on recordings or halves that were not fitted.
+    remaining : str
+        What is still unexplained, in words.
+    model : ModelFile
+        Recalibrated, with what was found.
+    plain_model : ModelFile
+        Recalibrated only.
+    notes : tuple of str
+    """
+
+    verdict: Verdict
+    confidence: float
+    findings: tuple[Finding, ...]
+    indistinguishable: tuple[Indistinguishable, ...]
+    mismatch: tuple[Mismatch, ...]
+    recalibration: tuple[Estimate, ...]
+    plain: Mapping[str, float]
+    augmented: Mapping[str, float]
+    held_out_plain: Mapping[str, float]
+    held_out_augmented: Mapping[str, float]
+    remaining: str
+    model: ModelFile
+    plain_model: ModelFile
+    notes: tuple[str, ...] = field(default=())
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _numbers(values: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: _number(value) for name, value in values.items()}
+
+
+def onset_data(onset: Onset | None) -> dict[str, Any]:
+    """Return an onset as it stands in the JSON."""
+    if onset is None:
+        return {'kind': 'none', 'recording': None, 'time_s': None, 'x_m': None}
+    if onset.kind is OnsetKind.TIME:
+        return {'kind': 'time', 'recording': onset.recording or None,
+                'time_s': onset.value, 'x_m': None}
+    side = 'above' if onset.kind is OnsetKind.PLACE_ABOVE else 'below'
+    return {'kind': 'place', 'recording': None, 'time_s': None, 'x_m': onset.value,
+            'side': side}
+
+
+def _estimate_data(estimate: Estimate) -> dict[str, Any]:
+    return {'name': estimate.name, 'value': _number(estimate.value), 'unit': estimate.unit,
+            'low': _number(estimate.low), 'high': _number(estimate.high)}
+
+
+def _finding_data(finding: Finding) -> dict[str, Any]:
+    return {
+        'effect': finding.effect, 'side': finding.side, 'subsystem': finding.subsystem,
+        'elements': list(finding.elements), 'regime': finding.regime,
+        'onset': onset_data(finding.onset),
+        'parameters': [_estimate_data(p) for p in finding.parameters],
+        'evidence': {'held_out_gain_nats': _number(finding.held_out_gain),
+                     'p_value': _number(finding.p_value),
+                     'share_explained': _number(finding.share)},
+        'rivals': [{'effect': r.effect, 'side': r.side,
+                    'held_out_gain_nats': _number(r.held_out_gain)} for r in finding.rivals],
+        'statement': finding.statement,
+    }
+
+
+def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
+    """
+    Return a diagnosis as plain data for JSON.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+
+    Returns
+    -------
+    dict
+        Numbers that are not finite are null.
+    """
+    return {
+        'schema': SCHEMA,
+        'verdict': diagnosis.verdict.value,
+        'confidence': _number(diagnosis.confidence),
+        'findings': [_finding_data(f) for f in diagnosis.findings],
+        'indistinguishable': [
+            {'effects': list(i.effects), 'separated_by': {
+                'sensors': list(i.sensors), 'manoeuvres': list(i.manoeuvres)}}
+            for i in diagnosis.indistinguishable],
+        'mismatch': [
+            {'recording': m.recording, 'channel': m.channel, 'start_s': m.start, 'end_s': m.end,
+             'strength_sigma': _number(m.strength), 'subsystem': m.subsystem}
+            for m in diagnosis.mismatch],
+        'recalibration': [_estimate_data(e) for e in diagnosis.recalibration],
+        'fit': {'plain': _numbers(diagnosis.plain), 'augmented': _numbers(diagnosis.augmented),
+                'held_out': {'plain': _numbers(diagnosis.held_out_plain),
+                             'augmented': _numbers(diagnosis.held_out_augmented)}},
+        'remaining': diagnosis.remaining,
+        'notes': list(diagnosis.notes),
+    }
