@@ -48,6 +48,11 @@ _Loader.add_implicit_resolver(
     list('-+.0123456789'))
 
 
+def brief(error: Exception) -> str:
+    """Return an error's message with endless words cut, such as a value of a damaged file."""
+    return re.sub(r'\S{120,}', lambda match: f'{match.group()[:57]}...', str(error))
+
+
 def _refuse_bombs(text: str) -> None:
     depth = aliases = 0
     for event in yaml.parse(text, _Base):

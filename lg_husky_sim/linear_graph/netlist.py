@@ -116,12 +116,12 @@ def read_netlist(path: str | Path) -> Netlist:
     ModelFileError
         If the file is no netlist; the message says which file, which element and what is wrong.
     """
-    from lg_husky_sim.yaml_files import read_yaml
+    from lg_husky_sim.yaml_files import brief, read_yaml
 
     try:
         return _netlist(read_yaml(path, ModelFileError))
     except (GraphError, ModelFileError) as error:
-        raise ModelFileError(f'{path}: {error}') from error
+        raise ModelFileError(f'{path}: {brief(error)}') from error
 
 
 def parse_netlist(text: str, source: str = 'netlist') -> Netlist:
@@ -135,12 +135,12 @@ def parse_netlist(text: str, source: str = 'netlist') -> Netlist:
     source : str
         What to call it in messages.
     """
-    from lg_husky_sim.yaml_files import parse_yaml
+    from lg_husky_sim.yaml_files import brief, parse_yaml
 
     try:
         return _netlist(parse_yaml(text))
     except (GraphError, ModelFileError, ValueError) as error:
-        raise ModelFileError(f'{source}: {error}') from error
+        raise ModelFileError(f'{source}: {brief(error)}') from error
 
 
 def _netlist(data: Any) -> Netlist:
