@@ -41,7 +41,7 @@ effects:
 - effect: battery_sag
 """
 
-NETLIST = '''name: DC motor
+NETLIST = """name: DC motor
 parameters:
   k_t: 0.05 N·m/A
 elements:
@@ -52,7 +52,7 @@ elements:
           port 2: {domain: rotational, from: shaft}, value: k_t}
   J: {is: inertia, from: shaft, value: 1e-3 kg·m²}
 outputs: [omega(J), i(L)]
-'''
+"""
 
 SCRIPT = """schema: lg_husky_sim/commands/1
 about: a left turn
