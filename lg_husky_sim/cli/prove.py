@@ -34,11 +34,13 @@ if TYPE_CHECKING:
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='DIR',
               help='Folder of the trial; the same call resumes an interrupted one.')
 @click.option('--generate-only', is_flag=True, help='Make and seal the cases; diagnose nothing.')
+@click.option('--score-only', is_flag=True,
+              help='Score the cases that are diagnosed already; diagnose nothing.')
 @click.option('--page', type=click.Path(path_type=Path), metavar='FILE.md',
               help='Also write the results as a page, with pictures beside it.')
 def command(
     cases: int, seed: int | None, tuning: bool, world: str, drive: str, jobs: int, out: Path,
-    generate_only: bool, page: Path | None,
+    generate_only: bool, score_only: bool, page: Path | None,
 ) -> None:
     """
     Try the diagnosis blind on robots with hidden physics.
@@ -63,12 +65,15 @@ def command(
     click.echo(f'{cases} answers sealed, commitment {seal}')
     if generate_only:
         return
-    with click.progressbar(length=cases, label='diagnosing') as bar:
-        for _ in trial.diagnose_all(folders, names, jobs):
-            bar.update(1)
+    if score_only:
+        names = trial.diagnosed(folders, names)
+    else:
+        with click.progressbar(length=cases, label='diagnosing') as bar:
+            for _ in trial.diagnose_all(folders, names, jobs):
+                bar.update(1)
     called = (f'lg_husky prove --cases {cases} --seed {first} '
               f'--{"tuning" if tuning else "report"} --world {world} --set {drive} --out DIR')
-    facts = {'command': called, 'seal': seal, 'first_seed': first,
+    facts = {'command': called, 'planned': cases, 'seal': seal, 'first_seed': first,
              'last_seed': first + cases - 1}
     _report(folders, sealed, names, facts, page)
 

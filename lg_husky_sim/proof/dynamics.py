@@ -189,7 +189,10 @@ def derivative(time: float, s: Vector, p: Vector, volts_left: float, volts_right
             s[10 + side], s[22 + side], friction, viscous, p)
         if ripple != 0.0:
             turn = s[14 + side] + p[w.RIPPLE_PHASE] * (1.0 + side)
-            rear_torque += ripple * (math.sin(turn) + 0.25 * math.sin(2.0 * turn + 1.0))
+            # Eccentric gears: nothing while they stand.
+            moving = 1.0 - math.exp(-(s[10 + side] / 0.08) ** 2)
+            rear_torque += moving * ripple * (
+                math.sin(turn) + 0.25 * math.sin(2.0 * turn + 1.0))
         motor_torque = p[w.TORQUE_CONSTANT] * current
         if p[w.COGGING] != 0.0:
             motor_torque += p[w.COGGING] * math.sin(

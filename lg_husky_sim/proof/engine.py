@@ -182,7 +182,8 @@ def integrate_engine(off: Vector, on: Vector, gate: Gate, demand: Vector, rough:
             data.ctrl[side] = volts
             ripple = p[w.RIPPLE_LEFT + side]
             turn = float(data.qpos[angles[side]]) + p[w.RIPPLE_PHASE] * (1.0 + side)
-            data.qfrc_applied[rates[side]] = floor[side] + ripple * math.sin(turn)
+            data.qfrc_applied[rates[side]] = floor[side] + ripple * (
+                math.tanh(abs(wheel[side]) / 0.1) * math.sin(turn))
         mujoco.mj_step(model, data)
         push = data.qacc[0:2] - model.opt.gravity[0:2]
         table[row] = (

@@ -98,6 +98,13 @@ def _rate_rows(rates: Sequence[Json]) -> list[list[str]]:
              _target(rate), _mark(rate)] for rate in rates if rate['count']]
 
 
+def _unfinished(results: Json) -> list[str]:
+    if results['cases'] == results['planned']:
+        return []
+    return [f'The first {results["cases"]} of {results["planned"]} cases to finish; '
+            'their order is random.', '']
+
+
 def page_of(results: Json, pictures: str = 'pictures') -> str:
     """
     Return docs/proof.md.
@@ -105,8 +112,8 @@ def page_of(results: Json, pictures: str = 'pictures') -> str:
     Parameters
     ----------
     results
-        The results file: `summary.summarise` with 'command', 'seal', 'first_seed',
-        'last_seed' beside.
+        The results file: `summary.summarise` with 'command', 'planned', 'seal',
+        'first_seed', 'last_seed' beside.
     pictures
         Folder of the pictures, as the page links to them.
 
@@ -115,7 +122,7 @@ def page_of(results: Json, pictures: str = 'pictures') -> str:
     parts = ['# Proof: a blind trial', '', _ABOUT.format(
         command=results['command'], seal=results['seal'][:16],
         first=results['first_seed'], last=results['last_seed']).strip(), '',
-        '## Figures', '', _markdown(head, _rate_rows(results['rates'])), '',
+        *_unfinished(results), '## Figures', '', _markdown(head, _rate_rows(results['rates'])), '',
         f'![rates with intervals]({pictures}/proof_rates.png)', '',
         '## Held-out improvement', '',
         'Share = (error of the refitted plain model - error of the diagnosed model) / (error of '

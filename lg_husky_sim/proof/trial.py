@@ -226,6 +226,22 @@ def diagnose_all(folders: Folders, names: Sequence[str], jobs: int) -> Iterator[
         pool.shutdown(wait=True, cancel_futures=True)
 
 
+def diagnosed(folders: Folders, names: Sequence[str]) -> list[str]:
+    """
+    Return the cases that have an outcome.
+
+    Raises
+    ------
+    LgHuskyError
+        None has.
+
+    """
+    done = [name for name in names if (folders.runs / name / 'outcome.json').exists()]
+    if not done:
+        raise LgHuskyError(f'no case in {folders.root} is diagnosed yet')
+    return done
+
+
 def open_and_judge(folders: Folders, sealed: dict[str, str],
                    names: Sequence[str]) -> tuple[Judgement, ...]:
     """

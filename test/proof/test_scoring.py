@@ -191,14 +191,16 @@ def test_the_summary_counts() -> None:
 
 
 def test_text_and_page_say_the_figures() -> None:
-    result = {**summary.summarise(judgements()), 'command': 'lg_husky prove', 'seal': 'ab' * 32,
-              'first_seed': 10_000, 'last_seed': 10_005}
+    result = {**summary.summarise(judgements()), 'command': 'lg_husky prove', 'planned': 6,
+              'seal': 'ab' * 32, 'first_seed': 10_000, 'last_seed': 10_005}
     assert '6 cases: 3 single effects, 1 pairs, 2 clean, 0 outside' in text_of(result)
     assert 'medium and strong: named right' in text_of(result)
     page = page_of(result)
     assert '| medium and strong: named right | 2 of 3 | 67 % (21 % to 94 %) | ≥ 80 % | missed |' \
         in page
     assert '| slope | 3 | 2 | 3 | 0.80 | payload 1 |' in page
+    assert 'cases to finish' not in page
+    assert 'The first 6 of 9 cases to finish' in page_of({**result, 'planned': 9})
 
 
 def test_pictures_are_drawn(tmp_path: Any) -> None:

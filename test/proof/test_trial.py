@@ -88,6 +88,11 @@ def test_a_case_without_outcome_is_not_scored(prepared: trial.Folders) -> None:
         trial.open_and_judge(prepared, {}, ['case_0009'])
 
 
+def test_scoring_before_any_diagnosis_says_so(tmp_path: Path) -> None:
+    with pytest.raises(LgHuskyError, match='is diagnosed yet'):
+        trial.diagnosed(trial.Folders(tmp_path), ['case_0001'])
+
+
 def test_the_command_line_names_baselines_and_recordings(tmp_path: Path) -> None:
     folders = trial.Folders(tmp_path)
     for name in ('recordings/rec1', 'recordings/rec2', 'baseline/base1'):
