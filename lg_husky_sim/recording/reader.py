@@ -16,7 +16,7 @@ from lg_husky_sim.recording.clock import common_clock
 from lg_husky_sim.recording.decode import Collected, COLLECTORS, edge_name, Rows
 from lg_husky_sim.recording.frames import compose, Edge, pose_chain
 from lg_husky_sim.recording.recording import CHANNELS, Recording
-from lg_husky_sim.recording.topics import candidates, listing, Topic, TopicMap, TYPES
+from lg_husky_sim.recording.topics import candidates, listing, ODOMETRY, Topic, TopicMap, TYPES
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 
@@ -126,6 +126,9 @@ def _recording(
         if not names and role in ('wheels', 'pose'):
             seen = ', '.join(sorted(entry.collected.seen)) or 'nothing'
             notes.append(f'no {role} in {entry.topic.name}: it holds {seen}')
+        if role == 'pose' and names and entry.topic.kind == ODOMETRY:
+            notes.append(f'pose taken from odometry ({entry.topic.name}): if that is computed '
+                         'from the wheels, their slip does not show in it')
     if not rows:
         raise RecordingError('; '.join([
             'no message of use: commands, wheels, imu or pose', *notes,

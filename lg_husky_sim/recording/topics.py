@@ -25,11 +25,13 @@ TYPES: Mapping[str, tuple[str, ...]] = {
 """Message types that a role may be read from, the best first."""
 
 NAMES: Mapping[str, tuple[str, ...]] = {
-    'command': ('husky_velocity_controller/cmd_vel', 'platform/cmd_vel',
-                'platform_velocity_controller/cmd_vel', 'cmd_vel'),
+    'command': ('husky_velocity_controller/cmd_vel', 'husky_velocity_controller/cmd_vel_unstamped',
+                'platform_velocity_controller/cmd_vel', 'platform/cmd_vel',
+                'platform_velocity_controller/cmd_vel_unstamped', 'platform/cmd_vel_unstamped',
+                'cmd_vel', 'cmd_vel_unstamped', 'cmd_vel_out'),
     'wheels': ('joint_states',),
     'imu': ('imu_um7/data', 'imu/data', 'imu_0/data', 'imu/data_raw', 'imu_0/data_raw', 'imu'),
-    'pose': ('tf', 'odometry/filtered', 'odom/filtered', 'platform/odom',
+    'pose': ('tf', 'ground_truth', 'odometry/filtered', 'odom/filtered', 'platform/odom',
              'husky_velocity_controller/odom', 'odom'),
     'current_left': ('left_driver_current', 'left_current'),
     'current_right': ('right_driver_current', 'right_current'),
@@ -37,6 +39,9 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     'status': ('status',),
 }
 """Endings of topic names, the best first."""
+
+SOURCES = ('joy', 'teleop', 'marker', 'autonomous', 'external', 'nav')
+"""Words in the names of command topics that are only one of several inputs of a multiplexer."""
 
 NEEDS_NAME = ('current_left', 'current_right')
 """Roles whose type is so common that only a known name is taken."""
@@ -141,7 +146,8 @@ def candidates(role: str, present: Iterable[Topic], chosen: str = '') -> tuple[T
         if rank == len(NAMES[role]) and (role in NEEDS_NAME or generic):
             continue
         fallback = topic.kind == ODOMETRY  # only where no tf serves
-        ranked.append((fallback, rank, -topic.count, topic.name, topic))
+        source = role == 'command' and any(word in topic.name.lower() for word in SOURCES)
+        ranked.append((fallback, rank, source, -topic.count, topic.name, topic))
     return tuple(entry[-1] for entry in sorted(ranked, key=lambda entry: entry[:-1]))
 
 

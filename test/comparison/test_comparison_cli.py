@@ -208,3 +208,21 @@ def test_compare_needs_commands_and_a_measurement(bag: Path, capsys: Any) -> Non
         capsys.readouterr()
         assert run(['compare', str(path), '--out', str(bag.parent / 'result')]) == 1
         assert message in _message(capsys)
+
+
+@pytest.mark.parametrize('kept', [('wheels',), ('pose',), ('imu',)])
+def test_compare_with_one_measured_stream(kept: tuple[str, ...], bag: Path) -> None:
+    streams = read_recording(bag).streams
+    path = write_recording(bag.parent / 'one',
+                           {key: streams[key] for key in ('command', *kept)})
+    out = bag.parent / 'result'
+    assert run(['compare', str(path), '--rival', str(path), '--out', str(out)]) == 0
+    data = json.loads((out / 'compare.json').read_text())
+    results = data['recordings'][0]['results']
+    expected = {'wheels': ['wheel_left', 'wheel_right', 'wheel_speed'],
+                'pose': ['forward', 'yaw_rate', 'heading', 'position'],
+                'imu': ['yaw_rate', 'accel_x']}[kept[0]]
+    for label in ('paper', 'one'):
+        assert list(results[label]['rmse']) == expected
+    assert max(results['one']['rmse'].values()) < 0.02  # the rival is the recording itself
+    assert (results['paper']['bounds_m']['x'] is None) == (kept != ('pose',))

@@ -10,6 +10,7 @@ from typing import Any
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.recording import read_recording, TopicMap
+from lg_husky_sim.recording.topics import candidates, Topic
 import numpy as np
 import pytest
 
@@ -174,6 +175,7 @@ def test_odometry_stands_in_for_tf(bag: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(pose[:, 0], np.arange(40))
     np.testing.assert_allclose(pose[:, 2], 0.2 * np.arange(40))  # unwrapped beyond pi
     assert recording.topics['pose'] == '/odom'
+    assert 'pose taken from odometry (/odom)' in ' '.join(recording.notes)
 
 
 def test_the_velocity_controllers_command_wins(bag: Any, tmp_path: Path) -> None:
@@ -181,6 +183,7 @@ def test_the_velocity_controllers_command_wins(bag: Any, tmp_path: Path) -> None
         bag.twist(1.0 + k, 1.0, 0.0, topic='/joy_teleop/cmd_vel')
         bag.twist(1.0 + k, 2.0, 0.0, topic='/husky_velocity_controller/cmd_vel')
         bag.twist(1.0 + k, 3.0, 0.0, topic='/cmd_vel')
+    bag.twist(4.0, 4.0, 0.0, topic='/husky/cmd_vel')  # fewer messages, but no input of a mux
     path = bag.write(tmp_path / 'bag')
     assert read_recording(path).stream('command').values[0, 0] == 2.0
     picked = read_recording(path, TopicMap.parse(['command=joy_teleop/cmd_vel']))
@@ -258,3 +261,66 @@ def test_a_folder_without_metadata_and_a_path_to_it(drive: Any, tmp_path: Path) 
     np.testing.assert_array_equal(
         read_recording(path).stream('wheels').values, whole.stream('wheels').values)
     assert whole.name == 'bag'
+
+
+@pytest.mark.parametrize(('names', 'best'), [
+    (('/a200_0000/joy_teleop/cmd_vel', '/a200_0000/platform/cmd_vel', '/a200_0000/cmd_vel'),
+     '/a200_0000/platform/cmd_vel'),
+    (('/joy_teleop/cmd_vel', '/twist_marker_server/cmd_vel', '/cmd_vel'), '/cmd_vel'),
+    (('/nav/cmd_vel', '/husky_velocity_controller/cmd_vel_unstamped'),
+     '/husky_velocity_controller/cmd_vel_unstamped'),
+    (('/something', '/drive/twist'), '/drive/twist'),
+])
+def test_the_likeliest_command(names: tuple[str, ...], best: str) -> None:
+    kind = 'geometry_msgs/msg/Twist'
+    topics = [Topic(name, kind, 10 if name == '/something' else 100) for name in names]
+    assert candidates('command', [*topics, Topic('/cmd_vel', 'std_msgs/msg/String', 9)])[0] == (
+        Topic(best, kind, 100))
+
+
+def test_the_status_of_a_ros1_husky(bag_writer: Any, tmp_path: Path) -> None:
+    from rosbags.typesys import get_types_from_msg
+    writer = bag_writer('ros1')
+    kind = 'husky_msgs/msg/HuskyStatus'
+    writer.store.register(get_types_from_msg(
+        'std_msgs/Header header\nfloat64 left_driver_current\nfloat64 right_driver_current\n'
+        'float64 battery_voltage\n', kind))
+    for k in range(3):
+        stamp = 1.0 + 0.1 * k
+        header = writer.header(writer._stamp(stamp))
+        writer.add('/status', kind, stamp, writer.new(kind, header, 1.5, 2.5, 24.0 + k))
+    recording = read_recording(writer.write(tmp_path / 'old.bag'))
+    np.testing.assert_array_equal(recording.stream('currents').values, [(1.5, 2.5)] * 3)
+    np.testing.assert_array_equal(recording.stream('voltage').values[:, 0], (24.0, 25.0, 26.0))
+    assert recording.topics == {'currents': '/status', 'voltage': '/status'}
+
+
+@pytest.mark.parametrize('mode', ['FILE', 'MESSAGE'])
+@pytest.mark.parametrize('storage', ['MCAP', 'SQLITE3'])
+def test_compressed_bags(mode: str, storage: str, drive: Any, tmp_path: Path) -> None:
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+    whole = read_recording(drive.write(tmp_path / 'plain'))
+    path = tmp_path / 'packed'
+    writer = Writer(path, version=9, storage_plugin=StoragePlugin[storage])
+    writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
+    with writer:
+        connections = {}
+        for topic, kind, logged, message in drive.rows:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=drive.store)
+            writer.write(connections[topic], logged, drive.store.serialize_cdr(message, kind))
+    packed = read_recording(path)
+    for name, series in whole.streams.items():
+        np.testing.assert_array_equal(packed.stream(name).values, series.values)
+
+
+def test_the_parts_of_a_split_bag_without_metadata(bag_writer: Any, tmp_path: Path) -> None:
+    (tmp_path / 'crashed').mkdir()
+    for part in range(2):
+        writer = bag_writer()
+        for k in range(5):
+            writer.twist(1.0 + part + 0.1 * k, float(part), 0.0)
+        made = writer.write(tmp_path / f'crashed_{part}')
+        (made / f'crashed_{part}.mcap').rename(tmp_path / 'crashed' / f'crashed_{part}.mcap')
+    command = read_recording(tmp_path / 'crashed').stream('command')
+    np.testing.assert_array_equal(command.column('forward'), [0.0] * 5 + [1.0] * 5)
