@@ -95,6 +95,15 @@ def message_type(name: str) -> Any:
     return getattr(importlib.import_module(f'{package}.msg'), kind)
 
 
+def serialised(message: Any) -> bytes:
+    """Return a message as CDR, as a bag stores it."""
+    if not HAVE_RCLPY:
+        from lg_husky_sim.ros.embedded.messages import serialise
+        return serialise(message)
+    from rclpy.serialization import serialize_message
+    return bytes(serialize_message(message))
+
+
 def service_type(name: str) -> Any:
     """
     Return what ``create_service`` takes for a service type, or None if it cannot be offered.
@@ -155,6 +164,7 @@ __all__ = [
     'ok',
     'parameter_overrides',
     'qos_profile_sensor_data',
+    'serialised',
     'service_type',
     'services_work',
     'shutdown',
