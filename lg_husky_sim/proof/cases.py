@@ -135,7 +135,8 @@ def _onset(spec: Spec, chosen: tuple[str, ...], rng: np.random.Generator) -> str
 
 
 def _setting(robot: robots.Robot, fields: Mapping[str, float],
-             drives: tuple[manoeuvres.Manoeuvre, ...], level: int) -> Setting:
+             drives: tuple[manoeuvres.Manoeuvre, ...], level: int,
+             heavy: bool) -> Setting:
     commands = np.concatenate([drive.commands for drive in drives])
     volts = world.NOMINAL_SUPPLY * robot.command.gain * (
         np.abs(commands[:, 0]) + world.TURN_RATIO * np.abs(commands[:, 1]))
@@ -146,7 +147,7 @@ def _setting(robot: robots.Robot, fields: Mapping[str, float],
         fields, float(np.abs(commands[:, 0]).max()), float(np.abs(commands[:, 1]).max()),
         float(min(volts.max(), world.NOMINAL_SUPPLY)), level, steepest,
         max(max(load[0] for load in loads), 10.0), max(load[1] for load in loads),
-        robot.fields['loop'] > 0.5)
+        heavy)
 
 
 def _load(robot: robots.Robot, drive: manoeuvres.Manoeuvre) -> tuple[float, float]:
@@ -177,7 +178,8 @@ def conceal(spec: Spec, robot: robots.Robot, drives: tuple[manoeuvres.Manoeuvre,
     told = []
     for name, severity in zip(names, severities, strict=True):
         level = catalogue.SEVERITIES.index(severity)
-        change = effects.build(name, _setting(robot, fields, drives, level), rng)
+        change = effects.build(name, _setting(robot, fields, drives, level,
+                                                    spec.world != 'g1'), rng)
         fields.update(change.fields)
         if fields['loop'] < 0.5 or robot.fields['loop'] > 0.5:
             command.update(_added(robot.command, change.command))

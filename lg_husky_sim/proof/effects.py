@@ -38,6 +38,9 @@ def _battery_droop(s: Setting, rng: Rng) -> Change:
 def _current_limit(s: Setting, rng: Rng) -> Change:
     # Relative to what the drive draws without it.
     amps = s.peak_current * draw(rng, s, (0.6, 0.75), (0.35, 0.45), (0.12, 0.2))
+    if s.heavy:
+        # Turning takes a standing current there, half of the peak and more.
+        amps = s.peak_current * draw(rng, s, (0.85, 0.92), (0.65, 0.8), (0.45, 0.55))
     return Change({'current_limit': amps}, parameters={'current_limit': amps})
 
 
@@ -173,19 +176,20 @@ def _quadratic_drag(s: Setting, rng: Rng) -> Change:
 
 
 def _yaw_scrub_coulomb(s: Setting, rng: Rng) -> Change:
-    moment = draw(rng, s, (0.6, 0.9), (1.8, 3.2), (5.0, 8.0))
+    moment = draw(rng, s, (0.6, 0.9), (1.8, 3.2), (5.0, 8.0)) * (3.0 if s.heavy else 1.0)
     return Change({'scrub': moment}, parameters={'yaw_coulomb_moment': moment})
 
 
 def _yaw_scrub_speed(s: Setting, rng: Rng) -> Change:
     part = draw(rng, s, (0.2, 0.3), (0.6, 1.0), (1.8, 3.0))
-    size = part * 12.865 / max(s.most_forward, 0.3)
+    size = part * (40.0 if s.heavy else 12.865) / max(s.most_forward, 0.3)
     return Change({'scrub_speed': size, 'scrub_exponent': float(rng.uniform(0.85, 1.3))},
                   parameters={'yaw_damping_per_speed': size})
 
 
 def _yaw_pull(s: Setting, rng: Rng) -> Change:
     moment = draw(rng, s, (0.5, 0.8), (1.5, 2.6), (4.0, 7.0)) * sign(rng)
+    moment *= 3.0 if s.heavy else 1.0
     return Change({'pull': moment}, side='left' if moment > 0 else 'right',
                   parameters={'pull_moment': moment})
 

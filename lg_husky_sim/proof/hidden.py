@@ -29,8 +29,8 @@ class Setting:
     squared_current, peak_current
         Integral of i² over the longest manoeuvre, and largest |i|, without the effect, the
         larger of both sides [A²·s], [A].
-    looped
-        A speed loop is in command.
+    heavy
+        The tyres have dry contact, so that turning takes several times the moment.
 
     """
 
@@ -42,7 +42,7 @@ class Setting:
     steepest: float = 20.0
     squared_current: float = 400.0
     peak_current: float = 20.0
-    looped: bool = False
+    heavy: bool = False
 
 
 @dataclass(frozen=True)
