@@ -178,8 +178,8 @@ def conceal(spec: Spec, robot: robots.Robot, drives: tuple[manoeuvres.Manoeuvre,
     told = []
     for name, severity in zip(names, severities, strict=True):
         level = catalogue.SEVERITIES.index(severity)
-        change = effects.build(name, _setting(robot, fields, drives, level,
-                                                    spec.world != 'g1'), rng)
+        setting = _setting(robot, fields, drives, level, heavy=spec.world != 'g1')
+        change = effects.build(name, setting, rng)
         fields.update(change.fields)
         if fields['loop'] < 0.5 or robot.fields['loop'] > 0.5:
             command.update(_added(robot.command, change.command))
