@@ -25,13 +25,14 @@ NEEDED = {'geometry_msgs/msg/TwistStamped', 'sensor_msgs/msg/JointState', 'senso
           'tf2_msgs/msg/TFMessage'}
 
 
-def best_of(run: Callable[[], object]) -> float:
-    """Return the shortest of several runs [s]: the one least disturbed."""
-    shortest = float('inf')
+def best_of(*runs: Callable[[], object]) -> list[float]:
+    """Return the shortest time of each [s], of several turns: the one least disturbed."""
+    shortest = [float('inf')] * len(runs)
     for _ in range(REPEATS):
-        before = time.perf_counter()
-        run()
-        shortest = min(shortest, time.perf_counter() - before)
+        for place, run in enumerate(runs):
+            before = time.perf_counter()
+            run()
+            shortest[place] = min(shortest[place], time.perf_counter() - before)
     return shortest
 
 
@@ -50,7 +51,7 @@ def decode(path: Path) -> int:
 def report(path: Path) -> None:
     """Measure one recording and print a line."""
     count = decode(path)
-    bare, whole = best_of(lambda: decode(path)), best_of(lambda: read_recording(path))
+    bare, whole = best_of(lambda: decode(path), lambda: read_recording(path))
     print(f'{path.name:<24}{count:>10}{1e3 * whole:>12.1f}{1e6 * whole / count:>12.2f}'
           f'{whole / bare:>12.2f}')
 

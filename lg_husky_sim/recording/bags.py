@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -34,26 +34,28 @@ class Bag:
             counts[key] = counts.get(key, 0) + connection.msgcount
         return tuple(Topic(name, kind, count) for (name, kind), count in counts.items())
 
-    def messages(self, wanted: Iterable[Topic]) -> Iterator[tuple[Topic, int, Any]]:
+    def messages(self, wanted: Sequence[Topic]) -> Iterator[tuple[int, int, Any]]:
         """
         Yield the messages of some topics; no other is decoded.
 
         Yields
         ------
-        topic : Topic
+        place : int
+            Place of the topic in `wanted`.
         logged : int
             Log time [ns].
         message : object
             With the fields of its ROS type.
         """
-        by_key = {(topic.name, topic.kind): topic for topic in wanted}
+        places = {(topic.name, topic.kind): place for place, topic in enumerate(wanted)}
         connections = [connection for connection in self._reader.connections
-                       if (connection.topic, connection.msgtype) in by_key]
+                       if (connection.topic, connection.msgtype) in places]
         if not connections:
             return
+        deserialize = self._reader.deserialize
         for connection, logged, raw in self._reader.messages(connections=connections):
-            topic = by_key[connection.topic, connection.msgtype]
-            yield topic, logged, self._reader.deserialize(raw, connection.msgtype)
+            kind = connection.msgtype
+            yield places[connection.topic, kind], logged, deserialize(raw, kind)
 
 
 @contextmanager

@@ -56,7 +56,9 @@ class Collected:
 
     def into(self, name: str, width: int) -> Rows:
         """Return the rows of a name, new ones at first."""
-        return self.rows.setdefault(name, Rows(width))
+        if name not in self.rows:
+            self.rows[name] = Rows(width)
+        return self.rows[name]
 
 
 def edge_name(parent: str, child: str) -> str:
@@ -69,7 +71,9 @@ def header_ns(message: Any) -> int:
     header = getattr(message, 'header', None)
     if header is None:
         return 0
-    return max(0, int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec))
+    stamp = header.stamp
+    total: int = stamp.sec * 1_000_000_000 + stamp.nanosec
+    return max(0, total)
 
 
 def _command(into: Collected, logged: int, message: Any) -> None:
@@ -79,7 +83,7 @@ def _command(into: Collected, logged: int, message: Any) -> None:
 
 
 def _wheels(into: Collected, logged: int, message: Any) -> None:
-    names = [str(name) for name in message.name]
+    names = message.name
     count = max(len(message.velocity), len(message.position))
     into.seen.update(names)
     sides = wheel_sides(names, count)

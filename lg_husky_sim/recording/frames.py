@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from functools import lru_cache
+import math
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.signals import FloatArray
@@ -17,6 +19,7 @@ ALIKE, UNLIKE = 100, 200
 Edge = tuple[str, str]
 
 
+@lru_cache(maxsize=256)
 def plain_frame(name: str) -> str:
     """Return a frame name without leading slash and namespace."""
     return name.strip('/').rsplit('/', 1)[-1]
@@ -28,9 +31,9 @@ def quaternion_heading(x: float, y: float, z: float, w: float) -> float:
 
     NaN for a quaternion of norm zero or with a value that is not finite.
     """
-    if not np.isfinite(x + y + z + w) or x == y == z == w == 0.0:
-        return float('nan')
-    return float(np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))
+    if not math.isfinite(x + y + z + w) or x == y == z == w == 0.0:
+        return math.nan
+    return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
 def pose_chain(

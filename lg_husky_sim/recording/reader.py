@@ -89,9 +89,11 @@ def _read(bag: Bag, attempt: Mapping[str, Topic]) -> dict[str, Collected]:
     by_topic: dict[Topic, list[str]] = {}
     for role, topic in attempt.items():
         by_topic.setdefault(topic, []).append(role)
-    for topic, logged, message in bag.messages(by_topic):
-        for role in by_topic[topic]:
-            COLLECTORS[role, topic.kind](collected[role], logged, message)
+    takers = [[(COLLECTORS[role, topic.kind], collected[role]) for role in roles]
+              for topic, roles in by_topic.items()]
+    for place, logged, message in bag.messages(tuple(by_topic)):
+        for collect, into in takers[place]:
+            collect(into, logged, message)
     return collected
 
 

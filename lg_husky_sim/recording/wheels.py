@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+import math
 import re
 
 from lg_husky_sim.signals import FloatArray
@@ -70,10 +71,14 @@ def side_means(values: Sequence[float] | FloatArray, sides: Sides) -> tuple[floa
     tuple of float
         Left and right; NaN where no value is there.
     """
+    count = len(values)
+    if not count:
+        return math.nan, math.nan
     means = []
     for places in sides:
-        there = [float(values[p]) for p in places if p < len(values) and np.isfinite(values[p])]
-        means.append(sum(there) / len(there) if there else float('nan'))
+        there = [value for value in (float(values[p]) for p in places if p < count)
+                 if math.isfinite(value)]
+        means.append(sum(there) / len(there) if there else math.nan)
     return means[0], means[1]
 
 
