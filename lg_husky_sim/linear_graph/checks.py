@@ -29,9 +29,20 @@ def check_graph(graph: LinearGraph) -> None:
     _check_grounding(graph)
     _check_masses(graph)
     _check_across_loops(graph)
+    _check_characteristics(graph)
+
+
+def check_complete(graph: LinearGraph) -> None:
+    """
+    Check what may be missing while a graph is being edited, but not when it is derived.
+
+    Raises
+    ------
+    GraphError
+        If through sources alone connect a node, or a branch ends at nothing.
+    """
     _check_through_cuts(graph)
     _check_open_ends(graph)
-    _check_characteristics(graph)
 
 
 def _check_names(graph: LinearGraph) -> None:

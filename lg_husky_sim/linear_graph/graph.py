@@ -12,7 +12,7 @@ import re
 from typing import TYPE_CHECKING
 
 from lg_husky_sim.errors import GraphError
-from lg_husky_sim.linear_graph.elements import Branch, Domain, Kind, TwoPort
+from lg_husky_sim.linear_graph.elements import article, Branch, Domain, Kind, TwoPort
 
 if TYPE_CHECKING:
     import numpy as np
@@ -80,8 +80,9 @@ class LinearGraph:
     ------
     GraphError
         If a name is used twice, a node lies in two domains or has no way to its ground, a domain
-        has no ground, a mass is not referred to ground, across sources form a loop, through
-        sources cut off a node, or a characteristic names an unknown variable.
+        has no ground, a mass is not referred to ground, across sources form a loop, or a
+        characteristic names an unknown variable. What only a finished graph must have (no open
+        ends, no node on through sources alone) is checked when the graph is derived.
     """
 
     branches: tuple[Branch, ...]
@@ -191,7 +192,7 @@ class LinearGraph:
             raise GraphError(f'variable {text!r} fits both ports; write {found[0].name!r} '
                              f'or {found[1].name!r}')
         domain = self.edges[self.edge_index(ports[0])].domain
-        raise GraphError(f'variable {text!r}: a {domain.value} branch has '
+        raise GraphError(f'variable {text!r}: {article(domain.value)} branch has '
                          f'{domain.across}({ports[0]}) and {domain.through}({ports[0]})')
 
     def variable_name(self, edge: int, is_across: bool) -> str:

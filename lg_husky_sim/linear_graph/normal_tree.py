@@ -21,7 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lg_husky_sim.errors import GraphError
-from lg_husky_sim.linear_graph.checks import Forest
+from lg_husky_sim.linear_graph.checks import check_complete, Forest
 from lg_husky_sim.linear_graph.elements import Branch, Kind, SOURCES
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.modular import (
@@ -68,9 +68,11 @@ def normal_tree(graph: LinearGraph) -> NormalTree:
     Raises
     ------
     GraphError
-        If sources contradict each other through two-ports, two-ports leave a variable open, or
-        a law gives the variable that the rest of the graph already fixes.
+        If a branch ends at nothing, sources contradict each other through two-ports, two-ports
+        leave a variable open, or a law gives the variable that the rest of the graph already
+        fixes.
     """
+    check_complete(graph)
     in_tree = _one_ports_in_tree(graph)
     in_tree |= _ports_in_tree(graph, in_tree)
     edges = [edge.name for edge in graph.edges]

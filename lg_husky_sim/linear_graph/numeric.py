@@ -245,6 +245,10 @@ class NumericModel:
         to_input, to_effort, to_excess = self._slices
         for at, edge in enumerate(structure.excess):
             name = self.graph.edges[edge].name
+            if np.all(np.abs(rows[n + at]) < TOLERANCE):
+                raise GraphError(f'{structure.dual(edge).name} of storage {name!r} is held at '
+                                 'zero by the branches around it; remove the storage, or the '
+                                 'two-port that shorts or opens it')
             for column in np.flatnonzero(np.abs(rows[n + at, to_effort:]) > TOLERANCE):
                 other = (*structure.efforts, *structure.excess)[int(column)]
                 raise GraphError(

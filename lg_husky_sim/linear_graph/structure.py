@@ -194,7 +194,7 @@ def analyse(graph: LinearGraph, outputs: Sequence[str] = ()) -> Structure:
     states = tuple(edge for edge in storages if edge not in dependent)
     if not states:
         raise GraphError('the graph has no state: it needs an A-type or a T-type whose variable '
-                         'is not fixed by sources alone')
+                         'is not fixed by sources and two-ports alone')
     builder = _Builder(graph, in_tree)
     builder.collect()
     return Structure(
