@@ -26,7 +26,7 @@ from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.model import Structure, compile_model
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown, solve
-from lg_husky_sim.identification.noise import Metric, metric, scales
+from lg_husky_sim.identification.noise import Metric, metric, robust, scales
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 
@@ -34,6 +34,8 @@ from lg_husky_sim.signals import FloatArray
 SERIOUS = 6
 #: Of these, those that are refitted to the end.
 POLISHED = 4
+#: Robust deviations from which an event that nothing explains loses weight.
+EVENT = 5.0
 #: Folds and block length of the held-out gain [s].
 FOLDS = 4
 BLOCK = 5.0
@@ -41,6 +43,8 @@ BLOCK = 5.0
 LEAST_GAIN = 18.0
 #: Least share of the unexplained energy that the first and a further effect must explain.
 LEAST_SHARE = (0.01, 0.2)
+#: Held-out gain from which a smaller share will do: a narrow effect can be certain [nats].
+STRONG_GAIN = (50.0, 400.0)
 #: Most effects that are named.
 MOST = 3
 
@@ -213,8 +217,9 @@ def extras_of(fit: Fit) -> dict[str, float]:
 
 def first_metric(observations: Observations, predicted: FloatArray) -> Metric:
     """Return a metric without correlation, from a first prediction."""
-    scale = scales(observations, observations.measured - predicted, predicted)
-    return metric(observations, observations.measured - predicted, scale, order=0)
+    residual = observations.measured - predicted
+    scale = robust(observations, residual, scales(observations, residual, predicted), EVENT)
+    return metric(observations, residual, scale, order=0)
 
 
 def recalibrate(observations: Observations, structure: Structure, nominal: Parameters) -> Fit:
@@ -234,7 +239,7 @@ def recalibrate(observations: Observations, structure: Structure, nominal: Param
     predicted = observations.predict(compile_model(structure).at(nominal))
     start: Mapping[str, float] = {p: nominal[p] for p in nominal}
     fit: Fit | None = None
-    for _ in range(2):
+    for _ in range(3):
         fit = fit_structure(observations, structure, nominal,
                             first_metric(observations, predicted), start, start)
         if fit is None:
@@ -262,15 +267,17 @@ def shared_metric(observations: Observations, fit: Fit, signatures: Sequence[Sig
     predicted = fit.solution.predicted
     residual = observations.measured - predicted
     scale = scales(observations, residual, predicted)
-    columns = np.column_stack([fit.solution.jacobian, *(s.columns for s in signatures)]) * (
-        scale[:, None])
-    norms = np.sqrt(np.sum(columns ** 2, axis=0))
+    columns = np.column_stack([fit.solution.jacobian, *(s.columns for s in signatures)])
+    norms = np.sqrt(np.sum((columns * scale[:, None]) ** 2, axis=0))
     columns = columns[:, norms > 1e-9] / norms[norms > 1e-9]
-    scaled = residual * scale
-    gram = columns.T @ columns + 1e-6 * np.eye(columns.shape[1])
-    left = scaled - columns @ np.linalg.solve(gram, columns.T @ scaled)
-    safe = np.where(scale > 0.0, scale, 1.0)
-    return metric(observations, np.where(scale > 0.0, left / safe, 0.0), scale)
+    left = residual
+    weighted = scale
+    for _ in range(3):
+        inside = columns * weighted[:, None]
+        gram = inside.T @ inside + 1e-6 * np.eye(columns.shape[1])
+        left = residual - columns @ np.linalg.solve(gram, inside.T @ (residual * weighted))
+        weighted = robust(observations, left, scale, EVENT)
+    return metric(observations, left, weighted)
 
 
 def folds_of(observations: Observations) -> FloatArray:
@@ -473,8 +480,9 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     after = energy(observations, rivals[0].fit, final)
     floor = float(np.count_nonzero(final.scale))
     share = (before - after) / max(before - 0.5 * floor, 1e-9)
-    adopted = (rivals[0].held_out > LEAST_GAIN
-               and share > LEAST_SHARE[0 if number == 0 else 1])
+    further = min(number, 1)
+    strong = share > LEAST_SHARE[further] or rivals[0].held_out > STRONG_GAIN[further]
+    adopted = rivals[0].held_out > LEAST_GAIN and strong
     return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted)
 
 

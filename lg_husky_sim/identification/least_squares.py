@@ -213,6 +213,29 @@ class Problem:
         return np.zeros(predicted.size)
 
 
+def _inside(unknowns: Sequence[Unknown], varied: FloatArray, curvature: FloatArray,
+            gradient: FloatArray) -> FloatArray:
+    # A step whose unknowns stay inside their bounds: those that would leave are put on the
+    # bound, and the others are solved for again.
+    move = np.zeros(varied.size)
+    free = np.ones(varied.size, dtype=bool)
+    tried = np.array(varied)
+    for _ in range(3):
+        held = gradient - curvature @ np.where(free, 0.0, move)
+        part = np.ix_(free, free)
+        move[free] = np.linalg.lstsq(curvature[part], held[free], rcond=None)[0]
+        wanted = np.array([v + (max(-1.5, min(1.5, m)) if u.logarithmic else m)
+                           for u, v, m in zip(unknowns, varied, move, strict=True)])
+        tried = np.array([u.varied(u.value(float(w)))
+                          for u, w in zip(unknowns, wanted, strict=True)])
+        out = free & (np.abs(tried - wanted) > 1e-12)
+        if not np.any(out) or np.all(out | ~free):
+            break
+        move[out] = tried[out] - varied[out]
+        free &= ~out
+    return tried
+
+
 def solve(problem: Problem, start: Mapping[str, float], steps: int = 12,
           tolerance: float = 0.02, progress: Callable[[], None] | None = None,
           known: FloatArray | None = None, polish: bool = True) -> Solution | None:
@@ -263,10 +286,7 @@ def solve(problem: Problem, start: Mapping[str, float], steps: int = 12,
         better = False
         for _ in range(7):
             lifted = curvature + np.diag(damping * np.diag(curvature) + 1e-12)
-            move = np.linalg.lstsq(lifted, gradient, rcond=None)[0]
-            tried = np.array([u.varied(u.value(float(v + max(-1.5, min(1.5, m)) if u.logarithmic
-                                                     else v + m)))
-                              for u, v, m in zip(problem.unknowns, varied, move, strict=True)])
+            tried = _inside(problem.unknowns, varied, lifted, gradient)
             there = problem.predict(tried)
             if there is not None:
                 new_cost, new_data = problem.cost(there, tried)

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 from scipy.signal import lfilter
 
 from lg_husky_sim.identification.problem import Observations
@@ -108,6 +109,38 @@ def scales(observations: Observations, residual: FloatArray, predicted: FloatArr
                 off = np.abs(residual[part] - np.median(whole)) > JUMP * max(wide, level)
                 scale[part][off] = 0.0
     return scale
+
+
+def robust(observations: Observations, left: FloatArray, scale: FloatArray, limit: float
+           ) -> FloatArray:
+    """
+    Return a scale that takes weight from single events that nothing explains.
+
+    A lost command or a slipping wheel leaves a few values far off; they must not decide between
+    hypotheses about all the others.
+
+    Parameters
+    ----------
+    observations : Observations
+    left : numpy.ndarray, shape (n_values,)
+        Residual that neither a fit nor any candidate explains.
+    scale : numpy.ndarray, shape (n_values,)
+    limit : float
+        Robust deviations from which a value loses weight.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n_values,)
+    """
+    weighted = np.array(scale)
+    for name in observations.channels:
+        slices = [s for s in observations.slices if s.channel == name]
+        wide = max(spread(np.concatenate([(left * scale)[s.first:s.last] for s in slices])), 1.0)
+        for s in slices:
+            size = np.abs((left * scale)[s.first:s.last]) / wide
+            near = maximum_filter1d(size, 7)
+            weighted[s.first:s.last] *= np.minimum(1.0, limit / np.maximum(near, 1e-9))
+    return weighted
 
 
 def metric(observations: Observations, residual: FloatArray, scale: FloatArray,
