@@ -110,8 +110,9 @@ def draw_graphs() -> list[Draw]:
     return found
 
 
-def powers(draw: Draw, state: ArrayLike, inputs: ArrayLike, input_rates: ArrayLike) -> NDArray[np.float64]:
-    """Return across times through of every edge."""
+def powers(draw: Draw, state: ArrayLike, inputs: ArrayLike, input_rates: ArrayLike,
+           ) -> NDArray[np.float64]:
+    """Return across times through, for every edge."""
     space = draw.space
     y = (space.C @ np.asarray(state) + space.D @ np.asarray(inputs)
          + space.F @ np.asarray(input_rates))
