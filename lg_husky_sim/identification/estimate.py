@@ -53,7 +53,7 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
              method: Method = Method.LEAST_SQUARES, free: Sequence[str] = (),
              nuisance: Sequence[str] = (), profiles: Sequence[str] = (), seed: int = 0,
              starts: int = STARTS, jobs: int = 1, scheduler: str | None = None,
-             baseline: ModelFile | None = None,
+             baseline: ModelFile | None = None, data: Observations | None = None,
              progress: Callable[[str], None] | None = None) -> FitResult:
     """
     Estimate parameters.
@@ -84,6 +84,8 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
         Address of a Dask scheduler for the starts.
     baseline : ModelFile, optional
         Model of the column "before"; ``model`` if not given.
+    data : Observations, optional
+        What to fit in place of all that the segments hold; for least squares.
     progress : callable, optional
         Called with a word after each unit of work.
 
@@ -101,12 +103,12 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
     """
     names = free_names(model, free)
     began = time.perf_counter()
-    data = observations(segments)
+    used = data or observations(segments)
     tell = progress or (lambda word: None)
     if method is Method.LEAST_SQUARES:
         unknowns = unknowns_of(model, names, nuisance)
-        ends = best_solution(data, model, unknowns, seed, starts, jobs, scheduler, tell)
-        problem, solution, evaluations = refine(data, model, unknowns, ends.values, tell)
+        ends = best_solution(used, model, unknowns, seed, starts, jobs, scheduler, tell)
+        problem, solution, evaluations = refine(used, model, unknowns, ends.values, tell)
         return _result(model, baseline or model, segments, method, seed, problem, solution,
                        ends.evaluations + evaluations, began, profiles, tell, ends=ends)
     if nuisance:
@@ -117,7 +119,7 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
     fitted = replace(model, parameters=model.parameters.replacing(
         dict(zip(names, map(float, found.values), strict=True))))
     unknowns = unknowns_of(fitted, names, ())
-    problem, solution, evaluations = refine(data, fitted, unknowns, {}, tell, steps=0)
+    problem, solution, evaluations = refine(used, fitted, unknowns, {}, tell, steps=0)
     return _result(model, baseline or model, segments, method, seed, problem, solution,
                    found.evaluations + evaluations, began, profiles, tell, search=found)
 

@@ -86,7 +86,8 @@ def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile,
         model, text, data, html = (places[path] for path in paths)
         save_model(result.model, model)
         text.write_text(str(result) + '\n', encoding='utf-8')
-        data.write_text(json.dumps(result.data(), indent=1, ensure_ascii=False) + '\n',
+        data.write_text(json.dumps(result.data(), indent=1, ensure_ascii=False,
+                                   allow_nan=False) + '\n',
                         encoding='utf-8')
         html.write_text(page('Model fitted to recordings', _intro(result),
                              _sections(result, pictures)), encoding='utf-8')

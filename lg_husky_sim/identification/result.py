@@ -191,7 +191,7 @@ class FitResult:
         return {
             'schema': SCHEMA, 'method': self.method.value, 'seed': self.seed,
             'recordings': list(self.recordings), 'converged': self.converged,
-            'cost': self.cost, 'evaluations': self.evaluations, 'seconds': self.seconds,
+            'cost': _finite(self.cost), 'evaluations': self.evaluations, 'seconds': self.seconds,
             'condition': self.condition,
             'parameters': [{
                 'name': one.name, 'value': one.value, 'unit': one.unit, 'low': one.low,
@@ -200,9 +200,9 @@ class FitResult:
             'correlation': self.correlation.tolist(), 'covariance': self.covariance.tolist(),
             'channels': [{'name': c.name, 'unit': c.unit, 'count': c.count,
                           'rms_before': c.before, 'rms_after': c.after} for c in self.channels],
-            'starts': [{'values': dict(s.values), 'cost': s.cost, 'converged': s.converged}
+            'starts': [{'values': dict(s.values), 'cost': _finite(s.cost), 'converged': s.converged}
                        for s in self.starts],
-            'history': self.history.tolist(),
+            'history': [[_finite(cost) for cost in row] for row in self.history],
             'profiles': [{
                 'name': p.name, 'low': _finite(p.low), 'high': _finite(p.high),
                 'values': p.values.tolist(), 'rise': [_finite(r) for r in p.rise]}

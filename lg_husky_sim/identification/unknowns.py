@@ -27,8 +27,9 @@ NUISANCES: dict[str, tuple[str, float, float, float]] = {
 #: Prior on the logarithm of a free parameter: a factor of e to this power either way. So weak
 #: that it only keeps directions that the data leave open from running away.
 WEAK = 4.0
-#: Random starts lie within this factor of the given value.
-AROUND = 6.0
+#: Random starts lie within this factor of the given value: of one that nobody knows, such as a
+#: damping, and of one that is known to its tolerance.
+AROUND, NEAR = 6.0, 1.8
 
 
 def free_names(model: ModelFile, asked: Sequence[str]) -> tuple[str, ...]:
@@ -131,8 +132,8 @@ def starts_of(model: ModelFile, unknowns: Sequence[Unknown], count: int, seed: i
     -------
     list of dict
         The first is the model's own; in the others the robot's parameters are spread by a
-        factor of :data:`AROUND` either way, evenly in the logarithm, and effects take the sizes
-        of the catalogue in turn.
+        factor of :data:`AROUND` or :data:`NEAR` either way, evenly in the logarithm, and effects
+        take the sizes of the catalogue in turn.
     """
     draws = np.random.default_rng(seed)
     of_effects = effect_parameters(model)
@@ -149,7 +150,8 @@ def starts_of(model: ModelFile, unknowns: Sequence[Unknown], count: int, seed: i
                 sizes = of_effects[unknown.name].starts
                 given = sizes[number % len(sizes)] * 1.3 ** shift
             elif number and unknown.logarithmic:
-                given *= AROUND ** shift
+                unsure = model.parameters.entry(unknown.name).tolerance >= 1.0
+                given *= (AROUND if unsure else NEAR) ** shift
             values[unknown.name] = min(max(given, unknown.lower), unknown.upper)
         result.append(values)
     return result

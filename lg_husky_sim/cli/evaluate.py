@@ -1,0 +1,73 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`lg_husky evaluate`: the paper's evaluation redone, and real steps judged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command(short_help="The paper's evaluation: calibrate, hold out, six numbers, Figs. 12-16.")
+@click.option('--out', required=True, type=click.Path(path_type=Path), metavar='DIR',
+              help='Folder for index.html, evaluation.json, evaluation.txt and the pictures.')
+@click.option('--case', 'cases', multiple=True, type=click.Choice(['synthetic', 'engine']),
+              help="The robot: the paper's graph with other numbers and noisy sensors, or a "
+                   'rigid-body engine (needs MuJoCo). Both by default, unless recordings are '
+                   'given.')
+@click.option('--calibrate', multiple=True, metavar='REC',
+              help='A recording to calibrate on, such as a circle.')
+@click.option('--held-out', multiple=True, metavar='REC',
+              help='A recording to predict; may be given several times.')
+@click.option('--rival', 'rivals', multiple=True, metavar='BAG',
+              help="Another simulator's recording of the same drive, one for each recording in "
+                   'their order.')
+@click.option('--steps', 'steps', multiple=True, metavar='REC',
+              help='A recording of commanded steps: fit every other step, predict the rest, '
+                   'beside three simple models; may be given several times.')
+@click.option('--model', type=click.Path(path_type=Path), metavar='FILE.yaml',
+              help="Model to start from; the Husky with the paper's parameters by default.")
+@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE',
+              help='Override a physical parameter; may be given several times.')
+@click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True)
+@click.option('--starts', type=click.IntRange(min=1), default=6, show_default=True,
+              help='Starts of the least squares.')
+@click.option('--jobs', type=click.IntRange(min=1), default=1, show_default=True,
+              help='Processes to use.')
+@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
+              help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).')
+def command(
+    out: Path, cases: tuple[str, ...], calibrate: tuple[str, ...], held_out: tuple[str, ...],
+    rivals: tuple[str, ...], steps: tuple[str, ...], model: Path | None,
+    settings: tuple[str, ...], seed: int, starts: int, jobs: int, topics: tuple[str, ...],
+) -> None:
+    """
+    Redo the paper's evaluation.
+
+    Each case is calibrated on its first drive and predicts the others; reported are the largest
+    tracking errors of each, beside those that the paper prints. Recordings of steps are divided:
+    every other step is fitted, the rest is predicted.
+    """
+    from lg_husky_sim.errors import CommandError
+    from lg_husky_sim.evaluation.session import MARKER, Request, run_evaluation
+    from lg_husky_sim.folders import check_folder
+    from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
+    from lg_husky_sim.identification.pages import check_extras
+    from lg_husky_sim.recording import TopicMap
+    from tqdm import tqdm
+
+    check_extras()
+    check_folder(out, MARKER)
+    if (held_out or rivals) and not calibrate:
+        raise CommandError('--held-out and --rival need --calibrate REC')
+    chosen = cases or (() if calibrate or steps else ('synthetic', 'engine'))
+    start = apply_settings(load_model(model), parse_settings(settings))
+    request = Request(chosen, calibrate, held_out, rivals, steps, start, seed, starts, jobs,
+                      TopicMap.parse(topics))
+    with tqdm(desc='evaluating', unit='step', disable=None, leave=False) as bar:
+        def tell(word: str) -> None:
+            bar.set_postfix_str(word, refresh=False)
+            bar.update()
+        click.echo(run_evaluation(request, out, tell))
+    click.echo(f'\nwritten: {out / "index.html"}')

@@ -1,0 +1,192 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Fit on half of a recording's steps, predict the other half, beside three baselines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from lg_husky_sim.errors import FitError
+from lg_husky_sim.evaluation.baselines import (
+    fit_kinematics,
+    fit_lags,
+    kinematic_predictor,
+    lag_predictor,
+    Predictor,
+)
+from lg_husky_sim.evaluation.steps import halves, steps_of
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.identification.estimate import estimate
+from lg_husky_sim.identification.noise import scales
+from lg_husky_sim.identification.options import with_effects
+from lg_husky_sim.identification.pages import Table
+from lg_husky_sim.identification.problem import Observations, observations, UNITS
+from lg_husky_sim.identification.result import FitResult
+from lg_husky_sim.recording import Recording, segments
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+from numpy.typing import NDArray
+
+#: What a real base does with a command before the paper's model begins.
+EFFECTS = ('speed_loop', 'command_latency', 'command_slew', 'command_limit:both')
+#: Parameters estimated with them; the loop follows without error, which these data allow.
+FREE = ('wheel_damping', 'yaw_damping', 'command_gain', 'turn_ratio', 'loop_lag', 'latency',
+        'slew_forward', 'slew_yaw', 'limit_forward', 'limit_yaw')
+#: Least number of steps of a recording that is divided.
+FEWEST = 4
+#: The forward speed is also judged by its average over this time [s].
+AVERAGE = 2.0
+AVERAGED = f'advance, mean over {AVERAGE:g} s'
+LABELS = ("paper's numbers", 'kinematic, effective track', 'first-order lag and delay',
+          'graph, B, B_H, c refitted', 'graph with the base')
+
+
+@dataclass(frozen=True, eq=False)
+class StepsResult:
+    """
+    A recording's held-out steps, predicted by several models.
+
+    Parameters
+    ----------
+    recording : str
+    steps : int
+        Commanded steps, every other one fitted.
+    channels : tuple of str
+    counts : tuple of int
+        Held-out values of each channel.
+    left_out : tuple of int
+        Values of each channel that are jumps of the localisation, left out for all models.
+    errors : mapping of str to tuple of float
+        Root mean square of each channel by model [unit of the channel].
+    refit, extended : FitResult
+        The graph refitted, and with what the base does to a command.
+    """
+
+    recording: str
+    steps: int
+    channels: tuple[str, ...]
+    counts: tuple[int, ...]
+    left_out: tuple[int, ...]
+    errors: dict[str, tuple[float, ...]]
+    refit: FitResult
+    extended: FitResult
+
+
+def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts: int = 6,
+                   jobs: int = 1, effects: Sequence[str] = EFFECTS,
+                   tell: Callable[[str], None] | None = None) -> StepsResult:
+    """
+    Fit on every other step and judge on the rest.
+
+    Parameters
+    ----------
+    recording : Recording
+    model : ModelFile
+        With the paper's numbers, or another robot's nominal ones.
+    seed, starts, jobs : int
+    effects : sequence of str
+        Added to the graph for the last model.
+    tell : callable, optional
+
+    Returns
+    -------
+    StepsResult
+
+    Raises
+    ------
+    FitError
+        If there are too few steps.
+    """
+    parts = segments(recording)
+    whole = observations(parts)
+    number = len(steps_of(whole))
+    if number < FEWEST:
+        raise FitError(f'recording {recording.name} has {number} commanded steps; dividing them '
+                       f'needs at least {FEWEST}')
+    fitted, held = halves(whole)
+    refit = estimate(model, parts, data=fitted, seed=seed, starts=starts, jobs=jobs,
+                     progress=tell)
+    extended_model = with_effects(refit.model, effects)
+    free = [name for name in FREE if name in extended_model.parameters]
+    if 'loop_gain' in extended_model.parameters:
+        extended_model = ModelFile(extended_model.structure, extended_model.parameters.replacing(
+            {'loop_gain': 0.0, 'loop_integral': 0.0}), extended_model.about)
+    extended = estimate(extended_model, parts, data=fitted, seed=seed, starts=starts, jobs=jobs,
+                        free=free, baseline=model, progress=tell)
+    predictors = dict(zip(LABELS, (
+        _graph(model), kinematic_predictor(fit_kinematics(fitted, model.parameters)),
+        lag_predictor(fit_lags(fitted)), _graph(refit.model), _graph(extended.model)),
+        strict=True))
+    predicted = {label: predict(held) for label, predict in predictors.items()}
+    best = predicted[LABELS[-1]]
+    use = scales(held, held.measured - best, best) > 0.0
+    return StepsResult(
+        recording.name, number, _rows(held),
+        tuple(int(held.channel_mask(_channel(name)).sum()) for name in _rows(held)),
+        tuple(int((held.channel_mask(_channel(name)) & ~use).sum()) for name in _rows(held)),
+        {label: _errors(held, values, use) for label, values in predicted.items()},
+        refit, extended)
+
+
+def _rows(data: Observations) -> tuple[str, ...]:
+    return (*data.channels, AVERAGED) if 'advance' in data.channels else data.channels
+
+
+def _channel(row: str) -> str:
+    return 'advance' if row == AVERAGED else row
+
+
+def _graph(model: ModelFile) -> Predictor:
+    plant = compile_model(model.structure).at(model.parameters)
+    return lambda data: data.predict(plant)
+
+
+def _errors(data: Observations, predicted: FloatArray, use: NDArray[np.bool_]
+            ) -> tuple[float, ...]:
+    error = data.measured - predicted
+    found = [float(np.sqrt(np.mean(error[data.channel_mask(name) & use] ** 2)))
+             for name in data.channels]
+    if 'advance' in data.channels:
+        found.append(_averaged(data, np.where(use, error, np.nan)))
+    return tuple(found)
+
+
+def _averaged(data: Observations, error: FloatArray) -> float:
+    # Position noise of some centimetres drowns the speed of one window, not that of several.
+    means = []
+    for one in data.slices:
+        if one.channel == 'advance':
+            part, times = error[one.first:one.last], data.times[one.first:one.last]
+            place = np.floor(times / AVERAGE)
+            for bin_ in np.unique(place):
+                inside = part[place == bin_]
+                inside = inside[np.isfinite(inside)]
+                if inside.size >= 5:
+                    means.append(float(np.mean(inside)))
+    return float(np.sqrt(np.mean(np.square(means)))) if means else float('nan')
+
+
+def steps_table(result: StepsResult) -> Table:
+    """Return the held-out errors of all models, one row a channel."""
+    rows = []
+    for place, name in enumerate(result.channels):
+        rows.append((f'{name} [{UNITS[_channel(name)]}]',
+                     *(f'{result.errors[label][place]:.3f}' for label in LABELS),
+                     f'{result.counts[place]} ({result.left_out[place]})'))
+    return Table((f'{result.recording}: held-out RMS', *LABELS, 'values (jumps left out)'), rows)
+
+
+def steps_data(result: StepsResult) -> dict[str, Any]:
+    """Return the result as plain data for JSON."""
+    return {
+        'recording': result.recording, 'steps': result.steps,
+        'channels': list(result.channels), 'counts': list(result.counts),
+        'left_out': list(result.left_out),
+        'held_out_rms': {label: [value if math.isfinite(value) else None for value in values]
+                         for label, values in result.errors.items()},
+        'refit': result.refit.data(), 'extended': result.extended.data(),
+    }

@@ -1,0 +1,129 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What `lg_husky evaluate` does: cases and steps, as one page with its tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import json
+from pathlib import Path
+from typing import Any
+
+from lg_husky_sim.evaluation import case_report
+from lg_husky_sim.evaluation.cases import Case, engine_case, recorded_case, synthetic_case
+from lg_husky_sim.evaluation.paper_case import evaluate_case
+from lg_husky_sim.evaluation.real import (
+    evaluate_steps,
+    LABELS,
+    steps_data,
+    steps_table,
+    StepsResult,
+)
+from lg_husky_sim.folders import result_folder
+from lg_husky_sim.husky.model_file import ModelFile, save_model
+from lg_husky_sim.identification.pages import page, Section
+from lg_husky_sim.recording import read_recording, TopicMap
+
+MARKER = 'evaluation.json'
+SCHEMA = 'lg_husky_sim/evaluation/1'
+
+
+@dataclass(frozen=True)
+class Request:
+    """
+    What is asked of an evaluation.
+
+    Parameters
+    ----------
+    cases : tuple of str
+        ``synthetic``, ``engine``.
+    calibrate, held_out, rivals, steps : tuple of str
+        Recordings.
+    model : ModelFile
+    seed, starts, jobs : int
+    topics : TopicMap or None
+    """
+
+    cases: tuple[str, ...]
+    calibrate: tuple[str, ...]
+    held_out: tuple[str, ...]
+    rivals: tuple[str, ...]
+    steps: tuple[str, ...]
+    model: ModelFile
+    seed: int = 0
+    starts: int = 6
+    jobs: int = 1
+    topics: TopicMap | None = None
+
+
+def _cases(request: Request) -> list[Case]:
+    made = [{'synthetic': synthetic_case, 'engine': engine_case}[name](request.seed)
+            for name in request.cases]
+    if request.calibrate:
+        made.append(recorded_case(request.calibrate, request.held_out, request.rivals,
+                                  request.topics))
+    return made
+
+
+def run_evaluation(request: Request, out: Path, tell: Callable[[str], None]) -> str:
+    """
+    Evaluate and write the folder, whole or not at all.
+
+    Parameters
+    ----------
+    request : Request
+    out : pathlib.Path
+        Gets index.html, evaluation.json, evaluation.txt, the pictures and the fitted models.
+    tell : callable
+        Called with a word after each unit of work.
+
+    Returns
+    -------
+    str
+        The tables as text.
+    """
+    results = [evaluate_case(case, request.model, request.seed, tell)
+               for case in _cases(request)]
+    steps = [evaluate_steps(read_recording(path, request.topics), request.model, request.seed,
+                            request.starts, request.jobs, tell=tell) for path in request.steps]
+    texts, sections = [], []
+    data: dict[str, Any] = {'schema': SCHEMA, 'seed': request.seed,
+                            'cases': [case_report.data(result) for result in results],
+                            'steps': [steps_data(result) for result in steps]}
+    with result_folder(out, MARKER) as folder:
+        for result in results:
+            pictures = case_report.figures(result)
+            for one in pictures:
+                (folder / f'{one.name}.png').write_bytes(one.png)
+            for kind, fit in zip(('ga', 'least_squares'), result.fits.values(), strict=True):
+                save_model(fit.model, folder / f'{result.case.name}_{kind}.yaml')
+            texts.append(case_report.text(result))
+            sections.append(case_report.section(result, pictures))
+        for result_of_steps in steps:
+            save_model(result_of_steps.extended.model,
+                       folder / f'{result_of_steps.recording}.yaml')
+            texts.append(steps_text(result_of_steps))
+            sections.append(_steps_section(result_of_steps))
+        text = '\n\n\n'.join(texts)
+        (folder / 'evaluation.txt').write_text(text + '\n', encoding='utf-8')
+        (folder / MARKER).write_text(json.dumps(data, indent=1, ensure_ascii=False,
+                                                allow_nan=False) + '\n',
+                                     encoding='utf-8')
+        (folder / 'index.html').write_text(page(
+            "The paper's evaluation, redone",
+            [f'Seed {request.seed}. Errors are measured minus simulated; x is ahead and y to '
+             'the left of the robot as it stood at the start.'], sections), encoding='utf-8')
+    return text
+
+
+def steps_text(result: StepsResult) -> str:
+    """Return a recording's table and the estimates of its last model as text."""
+    return (f'{result.recording}: {result.steps} steps, every other one fitted\n\n'
+            f'{case_report.as_text(steps_table(result))}\n\n{LABELS[-1]}:\n{result.extended}')
+
+
+def _steps_section(result: StepsResult) -> Section:
+    return Section(f'{result.recording}: {result.steps} steps, every other one fitted',
+                   points=result.extended.undetermined, tables=[steps_table(result)],
+                   verbatim=str(result.extended))
