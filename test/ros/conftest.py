@@ -1,0 +1,42 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Private domains and live nodes for the contract tests; both backends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+
+import pytest
+
+if find_spec('rclpy') is None and (
+        find_spec('cyclonedds') is None or find_spec('rosbags') is None):
+    collect_ignore_glob = ['test_contract*', 'test_conversions*', 'embedded/*', 'test_demo*',
+                           'test_golden*']
+elif find_spec('rclpy') is not None:
+    collect_ignore_glob = ['embedded/*']
+
+if find_spec('rclpy') is not None or find_spec('cyclonedds') is not None:
+    from lg_husky_sim.testing.live import LiveHusky, Probe, probed_domain
+
+
+@pytest.fixture(scope='module')
+def probe() -> Iterator[Probe]:
+    """Return a probe in a domain of this module's own."""
+    with probed_domain() as one:
+        yield one
+
+
+@pytest.fixture
+def start(probe: Probe) -> Iterator[Callable[..., LiveHusky]]:
+    """Return a maker of live nodes that end with the test."""
+    made: list[LiveHusky] = []
+
+    def make(arguments: tuple[str, ...] = (), environment: dict[str, str] | None = None,
+             **parameters: object) -> LiveHusky:
+        made.append(LiveHusky(probe, parameters, arguments, environment))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.node.stop()
