@@ -314,6 +314,25 @@ def time_onsets(observations: Observations) -> Onsets:
     return Onsets(owner * width + cells, width * len(names), tuple(found))
 
 
+def one_onset(observations: Observations, onset: Onset) -> Onsets:
+    """
+    Return a single onset: everything from a recording on.
+
+    Parameters
+    ----------
+    observations : Observations
+    onset : Onset
+        In time, in a named recording.
+
+    Returns
+    -------
+    Onsets
+    """
+    owner, _ = _places(observations)
+    number = observations.recordings.index(onset.recording)
+    return Onsets((owner >= number).astype(np.int64), 2, ((onset, np.array([False, True])),))
+
+
 def place_onsets(observations: Observations) -> Onsets:
     """
     Return onsets along x, from above and from below.

@@ -20,7 +20,7 @@ import numpy as np
 from lg_husky_sim.diagnosis.candidates import (
     RECALIBRATED, Candidate, candidates, effect_entries, effect_unknowns, nuisance)
 from lg_husky_sim.diagnosis.screening import (
-    Onsets, Projector, Score, Signature, place_onsets, scan, signatures_of, time_onsets)
+    Onsets, Projector, Score, Signature, one_onset, place_onsets, scan, signatures_of, time_onsets)
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.model import Structure, compile_model
@@ -222,7 +222,8 @@ def first_metric(observations: Observations, predicted: FloatArray) -> Metric:
     return metric(observations, residual, scale, order=0)
 
 
-def recalibrate(observations: Observations, structure: Structure, nominal: Parameters) -> Fit:
+def recalibrate(observations: Observations, structure: Structure, nominal: Parameters,
+                begin: Fit | None = None) -> Fit:
     """
     Fit the nominal model within the tolerances of its parameters.
 
@@ -231,17 +232,21 @@ def recalibrate(observations: Observations, structure: Structure, nominal: Param
     observations : Observations
     structure : Structure
     nominal : Parameters
+    begin : Fit, optional
+        A fit of the same structure to begin from.
 
     Returns
     -------
     Fit
     """
-    predicted = observations.predict(compile_model(structure).at(nominal))
-    start: Mapping[str, float] = {p: nominal[p] for p in nominal}
+    at = nominal if begin is None else begin.parameters
+    sizes: Mapping[str, float] = {p: at[p] for p in at}
+    start = sizes if begin is None else {**sizes, **begin.solution.values}
+    predicted = observations.predict(compile_model(structure).at(at))
     fit: Fit | None = None
     for _ in range(3):
         fit = fit_structure(observations, structure, nominal,
-                            first_metric(observations, predicted), start, start)
+                            first_metric(observations, predicted), start, sizes)
         if fit is None:
             raise LgHuskyError('the nominal model cannot be evaluated')
         predicted, start = fit.solution.predicted, fit.solution.values
@@ -377,7 +382,8 @@ def refit(observations: Observations, base: Fit, nominal: Parameters, score: Sco
 
 
 def search(observations: Observations, structure: Structure, nominal: Parameters,
-           progress: Progress = _silent, most: int = MOST) -> Search:
+           progress: Progress = _silent, most: int = MOST, onsets: bool = True,
+           change: Onset | None = None, start: Fit | None = None) -> Search:
     """
     Search the catalogue.
 
@@ -391,19 +397,30 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         Told what is being done and how far it is.
     most : int
         Most effects to adopt.
+    onsets : bool
+        Whether an effect may begin late.
+    change : Onset, optional
+        Where every effect begins; nothing else is tried then.
+    start : Fit, optional
+        A fit of the structure to some of the data, to begin from.
 
     Returns
     -------
     Search
     """
-    plain = recalibrate(observations, structure, nominal)
+    plain = recalibrate(observations, structure, nominal, start)
     base, rounds = plain, []
     folds = folds_of(observations)
-    masks = (time_onsets(observations), place_onsets(observations))
+    masks: tuple[Onsets, ...] = ()
+    if change is not None:
+        masks = (one_onset(observations, change),)
+    elif onsets:
+        masks = (time_onsets(observations), place_onsets(observations))
     pool = candidates()
     for number in range(most + 1):
-        progress(f'round {number + 1}: signatures', number / (most + 1))
-        one = play_round(observations, base, nominal, pool, masks, folds, number)
+        progress(f'round {number + 1}: signatures and refits', number / (most + 1))
+        one = play_round(observations, base, nominal, pool, masks, folds, number,
+                         only_late=change is not None)
         rounds.append(one)
         if not one.adopted or number == most:
             break
@@ -413,7 +430,7 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
 
 def play_round(observations: Observations, base: Fit, nominal: Parameters,
                pool: Sequence[Candidate], masks: Sequence[Onsets], folds: FloatArray,
-               number: int) -> Round:
+               number: int, only_late: bool = False) -> Round:
     """
     Play one round of the search.
 
@@ -428,6 +445,8 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     folds : numpy.ndarray
     number : int
         Effects that were adopted before.
+    only_late : bool
+        Whether only effects with an onset are asked for.
 
     Returns
     -------
@@ -439,10 +458,13 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
                                          observations, base.solution.predicted)]
     common = shared_metric(observations, base, signatures)
     residual = observations.measured - base.solution.predicted
-    late = base.structure.onset is None
+    late = base.structure.onset is None or only_late
     scores = screen(observations, base, common, signatures, masks if late else ())
     plain_metric = Metric(common.scale, {name: np.ones(1) for name in common.filters})
     broad = screen(observations, base, plain_metric, signatures, masks if late else ())
+    if only_late:
+        scores = [s for s in scores if s.onset is not None]
+        broad = [s for s in broad if s.onset is not None]
     serious = _serious(scores, SERIOUS)
     chosen = {(s.signature.candidate.label, s.onset is None) for s in serious}
     serious += [s for s in _serious(broad, SERIOUS // 2)

@@ -1,0 +1,165 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole way from recordings to an answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lg_husky_sim.diagnosis import judge
+from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
+from lg_husky_sim.diagnosis.mismatches import mismatches
+from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
+from lg_husky_sim.diagnosis.search import Fit, Progress, Search, search
+from lg_husky_sim.errors import DiagnosisError
+from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.husky.parameters import Parameter, Parameters
+from lg_husky_sim.identification.problem import Observations, observations
+from lg_husky_sim.recording import Recording, Segment, segments
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """
+    A diagnosis with what it was made from, for reports and pictures.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    search : Search
+    segments : tuple of Segment
+    nominal : ModelFile
+        That was in doubt.
+    """
+
+    diagnosis: Diagnosis
+    search: Search
+    segments: tuple[Segment, ...]
+    nominal: ModelFile
+
+
+def usable_segments(recordings: Sequence[Recording]) -> tuple[Segment, ...]:
+    """
+    Return the segments of recordings that share no name.
+
+    Raises
+    ------
+    DiagnosisError
+        If two recordings have the same name.
+    RecordingError
+        If one has no commands.
+    """
+    names = [r.name for r in recordings]
+    for name in names:
+        if names.count(name) > 1:
+            raise DiagnosisError(
+                f'two recordings are called {name!r}; rename one, since results go by name')
+    for recording in recordings:
+        recording.stream('command')
+    return tuple(s for r in recordings for s in segments(r))
+
+
+def model_of(fit: Fit, about: str, intervals: Sequence[Parameter] = ()) -> ModelFile:
+    """Return the model file of a fit; ``intervals`` replace their namesakes."""
+    return ModelFile(fit.structure, fit.parameters.with_entries(*intervals), about)
+
+
+def with_intervals(case: Search, nominal: Parameters) -> tuple[Parameter, ...]:
+    """Return the final fit's parameters with their 95 % intervals."""
+    final = case.final
+    names = [u.name for u in final.solution.unknowns if not u.extra]
+    found = []
+    metric = case.rounds[-1].metric
+    for number in judge.estimates(case.observations, final, metric, names):
+        entry = final.parameters.entry(number.name)
+        source = entry.source if number.name not in nominal else (
+            f'recalibrated by lg_husky diagnose; nominal {nominal[number.name]:g}')
+        found.append(replace(entry, low=number.low, high=number.high, source=source))
+    return tuple(found)
+
+
+def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Progress,
+             baseline: Sequence[Recording] = (), jobs: int = 1) -> Case:
+    """
+    Locate, name, model and show what a model lacks.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    nominal : ModelFile
+        The model in doubt.
+    progress : callable
+        Told what is being done and how far it is (0 to 1).
+    baseline : sequence of Recording
+        Recordings of the same robot before a change: the question is then what changed.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    RecordingError
+        If a recording cannot be used.
+    DiagnosisError
+        If names collide.
+    """
+    parts = usable_segments([*baseline, *recordings])
+    whole = observations(parts)
+    names = [r.name for r in recordings]
+    if baseline:
+        from lg_husky_sim.diagnosis.change import search_change
+        found = search_change(whole, {r.name for r in baseline}, nominal, progress)
+    else:
+        found = search(whole, nominal.structure, nominal.parameters, progress)
+    progress('numbers', 0.9)
+    own = tuple(s for s in parts if s.recording in names)
+    return Case(_diagnosis(found, own, nominal, whole), found, own, nominal)
+
+
+def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
+               whole: Observations) -> Diagnosis:
+    names = judge.findings(found)
+    numbers = judge.recalibration(found, nominal.parameters)
+    verdict = Verdict.KNOWN if names else Verdict.NOTHING_MISSING
+    residual = whole.measured - found.plain.solution.predicted
+    best = found.rounds[-1].base if not found.rounds[-1].adopted else found.final
+    culprit = names[0].subsystem if names else None
+    listed = mismatches(whole, residual, whole.measured - best.solution.predicted, culprit)
+    metric = found.rounds[-1].metric
+    plain_out, augmented_out = held_out_errors(
+        found.plain, found.final, nominal.parameters, own, whole, metric)
+    about = '; '.join(f.statement for f in names) or 'recalibrated, nothing added'
+    return Diagnosis(
+        verdict, judge.confidence(found), names,
+        judge.indistinguishable(found, nominal.parameters), listed, numbers,
+        errors(plant_of(found.plain), own), errors(plant_of(found.final), own),
+        plain_out, augmented_out, _remaining(found),
+        model_of(found.final, about, with_intervals(found, nominal.parameters)),
+        model_of(found.plain, 'recalibrated, nothing added'), _notes(found))
+
+
+def _remaining(found: Search) -> str:
+    last = found.rounds[-1]
+    residual = (found.observations.measured - found.final.solution.predicted)
+    words = []
+    for name in found.observations.channels:
+        mask = found.observations.channel_mask(name)
+        words.append(f'{name.replace("_", " ")} {np.sqrt(np.mean(residual[mask] ** 2)):.3g}')
+    best = last.rivals[0] if last.rivals and not last.adopted else None
+    text = 'root mean square residual: ' + ', '.join(words)
+    if best is not None:
+        text += (f'; the best further effect would be {best.effect.id} with a held-out gain of '
+                 f'{best.held_out:.0f} nats, which is not enough to adopt it')
+    return text
+
+
+def _notes(found: Search) -> tuple[str, ...]:
+    bound = found.final.solution.at_bound
+    notes = []
+    if bound:
+        notes.append('at the edge of what a recalibration may use up: ' + ', '.join(bound))
+    return tuple(notes)

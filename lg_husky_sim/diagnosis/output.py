@@ -1,0 +1,89 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Write what a diagnosis found: JSON, model files, text."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from lg_husky_sim.diagnosis.diagnose import Case
+from lg_husky_sim.diagnosis.result import Diagnosis, Verdict, diagnosis_data
+from lg_husky_sim.husky.model_file import save_model
+
+#: File that marks a folder of this kind.
+MARKER = 'diagnosis.json'
+_ROWS = (('position_rmse_m', 'position [m]'), ('wheel_speed_rmse', 'wheel speed [rad/s]'),
+         ('yaw_rate_rmse', 'yaw rate [rad/s]'), ('forward_rmse', 'forward speed [m/s]'),
+         ('max_abs_x_m', 'largest |X| [m]'), ('max_abs_y_m', 'largest |Y| [m]'))
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Return the answer in one sentence."""
+    match diagnosis.verdict:
+        case Verdict.NOTHING_MISSING:
+            return 'Nothing is missing: the recalibrated model explains the recordings.'
+        case Verdict.UNKNOWN:
+            return 'Something is missing that is not in the catalogue.'
+        case Verdict.KNOWN:
+            count = len(diagnosis.findings)
+            return 'One effect is missing.' if count == 1 else f'{count} effects are missing.'
+
+
+def error_table(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
+    """Return rows of errors: name, plain, augmented, held-out plain, held-out augmented."""
+    columns = (diagnosis.plain, diagnosis.augmented, diagnosis.held_out_plain,
+               diagnosis.held_out_augmented)
+    return [(label, *(f'{c[key]:.4g}' if key in c else '-' for c in columns))  # type: ignore[misc]
+            for key, label in _ROWS if any(key in c for c in columns)]
+
+
+def summary_text(diagnosis: Diagnosis) -> str:
+    """
+    Return the answer as text.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+
+    Returns
+    -------
+    str
+        Headline, findings, rivals, what cannot be told apart, errors before and after.
+    """
+    lines = [f'{headline(diagnosis)} (confidence {diagnosis.confidence:.2f})']
+    for finding in diagnosis.findings:
+        lines.append(f'  {finding.effect}: {finding.statement}')
+        lines.append(f'    held-out gain {finding.held_out_gain:.0f} nats, '
+                     f'p = {finding.p_value:.1g}; rivals: ' + (', '.join(
+                         f'{r.effect} {r.held_out_gain:.0f}' for r in finding.rivals) or 'none'))
+    for group in diagnosis.indistinguishable:
+        lines.append(f'  not told apart: {", ".join(group.effects)}; '
+                     f'would tell: {"; ".join((*group.sensors, *group.manoeuvres))}')
+    lines.append(f'  {"error":22} {"plain":>10} {"augmented":>10}   held out: {"plain":>10} '
+                 f'{"augmented":>10}')
+    for label, *cells in error_table(diagnosis):
+        lines.append(f'  {label:22} {cells[0]:>10} {cells[1]:>10}             {cells[2]:>10} '
+                     f'{cells[3]:>10}')
+    lines.append(f'  remaining: {diagnosis.remaining}')
+    lines.extend(f'  note: {note}' for note in diagnosis.notes)
+    return '\n'.join(lines)
+
+
+def write_files(folder: Path, case: Case) -> None:
+    """
+    Write the files of a diagnosis.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        An empty folder.
+    case : Case
+    """
+    diagnosis = case.diagnosis
+    save_model(diagnosis.model, folder / 'model.yaml')
+    save_model(diagnosis.plain_model, folder / 'plain.yaml')
+    (folder / 'diagnosis.txt').write_text(summary_text(diagnosis) + '\n', encoding='utf-8')
+    (folder / MARKER).write_text(
+        json.dumps(diagnosis_data(diagnosis), indent=1, ensure_ascii=False, allow_nan=False)
+        + '\n', encoding='utf-8')
