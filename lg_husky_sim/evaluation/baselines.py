@@ -112,7 +112,8 @@ def _robust_gains(inputs: FloatArray, values: FloatArray) -> tuple[FloatArray, f
     use = np.ones(values.size, dtype=bool)
     gains: FloatArray = np.zeros(inputs.shape[1])
     for _ in range(3):
-        gains = np.linalg.lstsq(inputs[use], values[use], rcond=None)[0]
+        solved = np.linalg.lstsq(inputs[use], values[use], rcond=None)[0]
+        gains = np.asarray(solved, dtype=np.float64)
         error = values - inputs @ gains
         limit = 4.0 * 1.4826 * float(np.median(np.abs(error))) + 1e-9
         use = np.abs(error) <= limit

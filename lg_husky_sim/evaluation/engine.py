@@ -159,8 +159,10 @@ def engine_robot(name: str) -> EngineRobot:
     known = {field.name for field in fields(EngineRobot)}
     if name not in ('nominal', 'robot'):
         raise SettingsError(f'no engine robot {name!r} (there are nominal, robot)')
-    given: dict[str, Any] = {key: tuple(map(float, value)) if isinstance(value, list) else float(value)
-             for key, value in {**data['nominal'], **data[name]}.items()}
+    entries = {**data['nominal'], **data[name]}
+    given: dict[str, Any] = {
+        key: tuple(map(float, value)) if isinstance(value, list) else float(value)
+        for key, value in entries.items()}
     if set(given) != known:
         odd = sorted(set(given) ^ known)[0]
         raise SettingsError(f'engine.yaml: {odd!r} is unknown or missing')

@@ -32,10 +32,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: What a real base does with a command before the paper's model begins.
-EFFECTS = ('speed_loop', 'command_latency', 'command_slew', 'command_limit:both')
+EFFECTS = ('speed_loop', 'command_latency', 'command_slew', 'command_limit:yaw')
 #: Parameters estimated with them; the loop follows without error, which these data allow.
 FREE = ('wheel_damping', 'yaw_damping', 'command_gain', 'turn_ratio', 'loop_lag', 'latency',
-        'slew_forward', 'slew_yaw', 'limit_forward', 'limit_yaw')
+        'slew_forward', 'slew_yaw', 'limit_yaw')
 #: Least number of steps of a recording that is divided.
 FEWEST = 4
 #: The forward speed is also judged by its average over this time [s].

@@ -200,8 +200,8 @@ class FitResult:
             'correlation': self.correlation.tolist(), 'covariance': self.covariance.tolist(),
             'channels': [{'name': c.name, 'unit': c.unit, 'count': c.count,
                           'rms_before': c.before, 'rms_after': c.after} for c in self.channels],
-            'starts': [{'values': dict(s.values), 'cost': _finite(s.cost), 'converged': s.converged}
-                       for s in self.starts],
+            'starts': [{'values': dict(s.values), 'cost': _finite(s.cost),
+                        'converged': s.converged} for s in self.starts],
             'history': [[_finite(cost) for cost in row] for row in self.history],
             'profiles': [{
                 'name': p.name, 'low': _finite(p.low), 'high': _finite(p.high),
