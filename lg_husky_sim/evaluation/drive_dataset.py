@@ -92,7 +92,7 @@ def read_drive(path: str | os.PathLike[str], robot: str = 'husky') -> DriveRun:
     columns = read_columns(path)
     if {'ros_time', 'calib_state', 'cmd_vel_x'} <= set(columns):
         return _raw(columns)
-    if {'start_time', 'cmd_left_0', 'icp_x_0', 'gt_icp_yaw'} <= set(columns):
+    if {'cmd_left_0', 'icp_x_0', 'gt_icp_yaw'} <= set(columns):
         return _processed(columns, robots[robot])
     raise RecordingError(f'{path}: neither a raw nor a processed run of the DRIVE data set; '
                          f'columns: {", ".join(list(columns)[:8])}, …')
@@ -160,7 +160,10 @@ def _processed(columns: Mapping[str, NDArray[Any]], robot: Mapping[str, float]) 
 
     def windows(name: str) -> FloatArray:
         return np.column_stack([numbers(columns[f'{name}_{k}'], name) for k in range(count)])
-    begin = numbers(columns['start_time'], 'start_time')
+    rows = len(columns['cmd_left_0'])
+    # Without times the windows follow each other.
+    begin = (numbers(columns['start_time'], 'start_time') if 'start_time' in columns
+             else count * step * np.arange(rows, dtype=np.float64))
     order = np.argsort(begin, kind='stable')
     begin = begin[order]
     times = (begin[:, None] - begin[0] + step * np.arange(count)).ravel()
@@ -170,7 +173,7 @@ def _processed(columns: Mapping[str, NDArray[Any]], robot: Mapping[str, float]) 
     local = np.stack([windows(f'icp_{name}')[order] for name in ('x', 'y', 'yaw')], axis=2)
     ends = np.column_stack([numbers(columns[f'gt_icp_{name}'], name)[order]
                             for name in ('x', 'y', 'yaw')])
-    pose = _chained(local, ends, begin, count * step)
+    pose = _chained(local, ends)
     wheels = np.column_stack([windows(f'{side}_wheel_vel')[order].ravel()
                               for side in ('left', 'right')])
     imu = np.column_stack([windows(name)[order].ravel() for name in (
@@ -185,7 +188,7 @@ def _processed(columns: Mapping[str, NDArray[Any]], robot: Mapping[str, float]) 
     }, EPOCH)
 
 
-def _chained(local: FloatArray, ends: FloatArray, begin: FloatArray, span: float) -> FloatArray:
+def _chained(local: FloatArray, ends: FloatArray) -> FloatArray:
     # Each window starts where the one before ended; after a gap it starts there too, for what
     # was driven in between is not known.
     at, rows = np.zeros(3), []
