@@ -30,6 +30,7 @@ import re
 from typing import Any
 
 from lg_husky_sim.errors import GraphError, ModelFileError
+from lg_husky_sim.linear_graph.checks import check_complete
 from lg_husky_sim.linear_graph.elements import (
     Branch,
     Characteristic,
@@ -174,6 +175,7 @@ def _netlist(data: Any) -> Netlist:
         else:
             two_ports.append(element)
     graph = LinearGraph(tuple(branches), tuple(two_ports), _ground(top.get('ground', GROUND)))
+    check_complete(graph)
     check_units(graph, units)
     outputs = tuple(_texts(top.get('outputs') or [], 'outputs'))
     for output in outputs:

@@ -187,7 +187,7 @@ def test_expanded_drivetrain_tends_to_the_simplified_one(
         husky: LinearGraph, paper: dict[str, float]) -> None:
     limit = np.sort(compile_numeric(husky).at(paper).poles.real)[::-1]
     errors = []
-    for stiffness in (1e6, 1e7, 1e8):
+    for stiffness in (1e7, 1e8, 1e9):
         slow = np.array(expanded_poles(stiffness, 1e-5 * stiffness, paper)[:6])
         assert np.abs(slow.imag).max() < 1e-9 * np.abs(slow.real).max()
         errors.append(float(np.max(np.abs(np.sort(slow.real)[::-1] - limit) / np.abs(limit))))
