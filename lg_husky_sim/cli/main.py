@@ -9,6 +9,7 @@ from importlib import import_module, metadata
 from importlib.util import find_spec
 import os
 import sys
+from typing import Any
 
 import click
 from lg_husky_sim.errors import LgHuskyError
@@ -32,6 +33,10 @@ VERBS = {
     'import': 'lg_husky_sim.cli.import_',
 }
 """Verb to the module whose `command` is its click command, in the order of a newcomer's tour."""
+
+
+# A group of verbs within a verb, called without arguments; click has the class since 8.2.
+_NO_ARGUMENTS: Any = getattr(click.exceptions, 'NoArgsIsHelpError', ())
 
 
 class LazyGroup(click.Group):
@@ -94,14 +99,15 @@ def run(arguments: Sequence[str] | None = None) -> int:
         standard error says which), 130 interrupted.
 
     """
+    given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = cli.main(arguments, prog_name='lg_husky', standalone_mode=False)
+        code = cli.main(given or ['--help'], prog_name='lg_husky', standalone_mode=False)
     except (click.exceptions.Abort, KeyboardInterrupt):
         return fail('interrupted', INTERRUPTED)
-    except click.exceptions.NoArgsIsHelpError as error:
-        error.show()
-        return 1
     except click.UsageError as error:
+        if isinstance(error, _NO_ARGUMENTS):
+            error.show()
+            return 1
         where = error.ctx.command_path if error.ctx else 'lg_husky'
         return fail(f'error: {error.format_message()} (see {where} -h)')
     except click.ClickException as error:
