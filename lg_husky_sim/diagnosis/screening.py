@@ -107,9 +107,10 @@ def signatures_of(candidate: Candidate, structure: Structure, parameters: Parame
     found = []
     for start in candidate.starts:
         if candidate.signed:
-            free = list(start)
-            sizes = [{name: start[name] if name == one else neutral(name) for name in free}
-                     for one in free]
+            fixed = [p.name for p in always.parameters() if p.fixed]
+            free = [name for name in start if name not in fixed]
+            sizes = [{name: start[name] if name in (one, *fixed) else neutral(name)
+                      for name in start} for one in free]
         else:
             sizes = [dict(start)]
         columns = []
@@ -160,6 +161,12 @@ class Projector:
     def _project(self, rows: FloatArray) -> FloatArray:
         projected: FloatArray = rows - self.basis @ (self.basis.T @ rows)
         return projected
+
+    def projected(self, columns: FloatArray) -> FloatArray:
+        """Return columns whitened and projected, shape (n_values + n_unknowns, k)."""
+        white = self.metric.whiten(self.observations, columns)
+        padding = np.zeros((self.basis.shape[0] - self.size, columns.shape[1]))
+        return self._project(np.vstack([white, padding]))
 
     def sums(self, columns: FloatArray, groups: NDArray[np.int64], count: int) -> Sums:
         """

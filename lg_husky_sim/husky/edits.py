@@ -241,6 +241,40 @@ def _sensor(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     return network.changing(sensors={p.name: p.name for p in effect.parameters()})
 
 
+#: Argument of a smooth effort to the context entry that it reads; the others are variables.
+_CONTEXT = {'time': 0.0, 'heading': 1.0, 'x': 2.0, 'y': 3.0, 'angle_left': 4.0,
+            'angle_right': 5.0}
+_KNOTS = tuple(f'knot_{i}' for i in range(1, 10))
+
+
+def _table_row(argument: str) -> LawRow:
+    count = float(len(_KNOTS))
+    periodic = argument in ('heading', 'angle_left', 'angle_right')
+    return LawRow(Law.TABLE, (_CONTEXT.get(argument, -1.0), 'range_low', 'range_high',
+                              -count if periodic else count, *_KNOTS))
+
+
+def _described(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    # A smooth effort of one argument, for physics without a name.
+    argument = effect.shape
+    variable = {'forward': ('v(M_H)',), 'yaw': ('omega(J_H)',)}
+    if effect.id in ('smooth_force', 'smooth_moment'):
+        mass = branch_of(network.graph, 'M_H' if effect.id == 'smooth_force' else 'J_H')
+        return network.with_force(f'F_{effect.id}', mass.domain, mass.tail, mass.head,
+                                  _table_row(argument), variable.get(argument, ()))
+    for letter, inertia in _axles(network, effect.side):
+        number, side = ('1', 'left') if letter == 'L' else ('2', 'right')
+        if effect.id == 'smooth_torque':
+            row = _table_row(f'angle_{side}' if argument == 'angle' else argument)
+            of = (f'omega({inertia.name})',) if argument == 'wheel_rate' else ()
+            network = network.with_force(f'T_{effect.id}_{letter}', inertia.domain,
+                                         inertia.tail, inertia.head, row, of)
+        else:
+            of = (f'V(V_S{number})',) if argument == 'voltage' else ()
+            network = network.with_voltage(effect.id, number, _table_row(argument), of)
+    return network
+
+
 _BY_SUBSYSTEM: Mapping[str, Callable[[EditedNetwork, Effect], EditedNetwork]] = {
     'electrical': _electrical, 'drivetrain': _drivetrain, 'traction': _traction,
     'translation': _chassis, 'rotation': _chassis, 'command': _command, 'sensor': _sensor,
@@ -266,4 +300,6 @@ def edit(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     ParameterError
         If the effect does not fit the network.
     """
+    if effect.id.startswith('smooth_'):
+        return _described(network, effect)
     return _BY_SUBSYSTEM[effect.kind.subsystem.value](network, effect)

@@ -208,6 +208,13 @@ def catalogue() -> Mapping[str, EffectKind]:
     return {name: _read_kind(name, entry) for name, entry in data['effects'].items()}
 
 
+@cache
+def descriptions() -> Mapping[str, EffectKind]:
+    """Return the smooth efforts of ``config/effects.yaml``, which describe unnamed physics."""
+    data = read_yaml(config_path('effects.yaml'), ModelFileError)
+    return {name: _read_kind(name, entry) for name, entry in data['descriptions'].items()}
+
+
 def effect_kind(name: str) -> EffectKind:
     """
     Return one entry of the catalogue.
@@ -217,7 +224,7 @@ def effect_kind(name: str) -> EffectKind:
     ParameterError
         If there is none of that id; a near one is suggested.
     """
-    known = catalogue()
+    known = {**catalogue(), **descriptions()}
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1)
         hint = f'; did you mean {near[0]}?' if near else ''

@@ -65,7 +65,8 @@ class Law(enum.IntEnum):
     BACKLASH = 14
     """f = -p1 z2 while the play p0 is being crossed at the rate z0/p1 - z1; p2 is the side."""
     TABLE = 15
-    """f = table over [p1, p2] with p3 knots p4..., of context p0 >= 0 or of z0 if p0 < 0."""
+    """f = table over [p1, p2] with |p3| knots p4..., of context p0 >= 0 or of z0 if p0 < 0;
+    straight between the knots, and periodic where p3 is negative."""
 
 
 #: The laws as expressions of the linear graph: arguments z1, z2, ..., coefficients p0, p1, ...
@@ -99,8 +100,15 @@ def _clip(value: float, lower: float, upper: float) -> float:
 
 @jit
 def _table(coefficients: FloatArray, c: int, j: int, argument: float) -> float:
-    knots = int(coefficients[c, j, 3])
+    knots = int(abs(coefficients[c, j, 3]))
     lower, upper = coefficients[c, j, 1], coefficients[c, j, 2]
+    if coefficients[c, j, 3] < 0.0:
+        turns = (argument - lower) / (upper - lower)
+        place = (turns - math.floor(turns)) * knots
+        left = int(place)
+        share = place - left
+        return float(coefficients[c, j, 4 + left % knots] * (1.0 - share)
+                     + coefficients[c, j, 4 + (left + 1) % knots] * share)
     place = (argument - lower) / (upper - lower) * (knots - 1)
     if place <= 0.0:
         return float(coefficients[c, j, 4])

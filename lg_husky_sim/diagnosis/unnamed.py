@@ -1,0 +1,202 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Physics without a name: a missing effort as a smooth function of one quantity.
+
+Every description is a modulated source of the graph whose law is a table of nine knots. Its
+columns are screened like those of the catalogue; what counts is the gain on blocks that were not
+fitted. A description that explains much more than the named effects do says that something is
+missing which is none of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+import itertools
+import math
+
+import numpy as np
+
+from lg_husky_sim.diagnosis.screening import Projector, Signature, signatures_of
+from lg_husky_sim.diagnosis.candidates import Candidate
+from lg_husky_sim.husky.effects import Effect, descriptions
+from lg_husky_sim.husky.model import Structure
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.identification.problem import Observations, PERIOD, simulate_piece
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.simulation.kernel import COLUMNS
+from lg_husky_sim.simulation.simulator import Simulator
+
+#: Column of the simulator that gives the range of an argument.
+_SOURCE = {'forward': 'forward', 'yaw': 'yaw_rate', 'x': 'x', 'y': 'y',
+           'wheel_rate': 'wheel_left', 'voltage': 'voltage_left'}
+#: Size of a knot when its column is taken, by the effect.
+_SIZE = {'smooth_force': 5.0, 'smooth_moment': 1.0, 'smooth_torque': 0.5, 'smooth_voltage': 0.5}
+_PERIODIC = ('heading', 'angle', 'angle_left', 'angle_right')
+KNOTS = tuple(f'knot_{i}' for i in range(1, 10))
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """
+    A smooth effort and what it explains.
+
+    Parameters
+    ----------
+    effect : Effect
+        Of ``descriptions()``.
+    held_out : float
+        Gain on blocks that were not fitted [nats].
+    energy : float
+        Scaled sum of squares that is left with it.
+    knots : tuple of float
+        Values at the knots [unit of the effort].
+    range : tuple of float
+        First and last knot [unit of the argument].
+    """
+
+    effect: Effect
+    held_out: float
+    energy: float
+    knots: tuple[float, ...]
+    range: tuple[float, float]
+
+    @property
+    def argument(self) -> str:
+        """Quantity that it is a function of."""
+        return self.effect.shape
+
+
+def ranges(observations: Observations, plant: Plant) -> dict[str, tuple[float, float]]:
+    """
+    Return the range of every argument in a simulation of the data.
+
+    Parameters
+    ----------
+    observations : Observations
+    plant : Plant
+
+    Returns
+    -------
+    dict of str to (float, float)
+        Robust lowest and highest value.
+    """
+    simulator = Simulator(observations.plant_in(plant, observations.recordings[-1]), PERIOD,
+                          fine_pose=False)
+    rows = np.vstack([simulate_piece(simulator, piece) for piece in observations.pieces])
+    found = {name: (0.0, 2.0 * math.pi) for name in _PERIODIC}
+    for argument, column in _SOURCE.items():
+        low, high = np.quantile(rows[:, COLUMNS.index(column)], [0.005, 0.995])
+        found[argument] = (float(low), float(max(high, low + 1e-3)))
+    found['time'] = (float(observations.times.min()), float(observations.times.max()))
+    return found
+
+
+def description_signatures(observations: Observations, structure: Structure,
+                           parameters: Parameters, extra: dict[str, float], plant: Plant,
+                           base: FloatArray) -> list[Signature]:
+    """
+    Return the signatures of all descriptions, one column a knot.
+
+    Parameters
+    ----------
+    observations : Observations
+    structure, parameters, extra, plant
+        A fitted model.
+    base : numpy.ndarray, shape (n_values,)
+        Its prediction.
+
+    Returns
+    -------
+    list of Signature
+    """
+    spans = ranges(observations, plant)
+    found = []
+    for name, kind in descriptions().items():
+        for side, shape in itertools.product(kind.sides, kind.shapes):
+            low, high = spans[shape]
+            start = {knot: _SIZE[name] for knot in KNOTS}
+            candidate = Candidate(Effect(name, side, shape),
+                                  ({**start, 'range_low': low, 'range_high': high},), True)
+            found.extend(signatures_of(candidate, structure, parameters, extra, observations,
+                                       base))
+    return found
+
+
+def describe(observations: Observations, signatures: Sequence[Signature], projector: Projector,
+             residual: FloatArray, folds: FloatArray, count: int) -> tuple[Description, ...]:
+    """
+    Rank descriptions by what they explain of held-out blocks.
+
+    Parameters
+    ----------
+    observations : Observations
+    signatures : sequence of Signature
+        Of :func:`description_signatures`.
+    projector : Projector
+        Of the fitted model, under a metric for which the signatures are no noise.
+    residual : numpy.ndarray, shape (n_values,)
+        Of the fitted model.
+    folds : numpy.ndarray, shape (n_values,)
+        Fold of each value.
+    count : int
+        Number of folds.
+
+    Returns
+    -------
+    tuple of Description
+        Largest held-out gain first.
+    """
+    found = []
+    target = projector.residual[:projector.size]
+    scale = projector.metric.scale
+    for signature in signatures:
+        columns = projector.projected(signature.columns)[:projector.size]
+        held_out = 0.0
+        for fold in range(count):
+            out = folds == fold
+            weights = _ridge(columns[~out], target[~out])
+            left = target[out] - columns[out] @ weights
+            held_out += 0.5 * float(target[out] @ target[out] - left @ left)
+        weights = _ridge(columns, target)
+        left = (residual - signature.columns @ weights) * scale
+        names = [n for n in signature.start if n in KNOTS]
+        knots = tuple(float(w) * signature.start[n] for w, n in zip(weights, names, strict=True))
+        found.append(Description(
+            signature.candidate.effect, held_out, float(np.sum(np.minimum(left ** 2, 1e6))),
+            knots, (signature.start['range_low'], signature.start['range_high'])))
+    return tuple(sorted(found, key=lambda d: -d.held_out))
+
+
+def _ridge(columns: FloatArray, target: FloatArray) -> FloatArray:
+    gram = columns.T @ columns
+    lift = 1e-3 * float(np.trace(gram)) / gram.shape[0] + 1e-9
+    weights: FloatArray = np.linalg.solve(gram + lift * np.eye(gram.shape[0]),
+                                          columns.T @ target)
+    return weights
+
+
+def described_structure(structure: Structure, parameters: Parameters, description: Description
+                        ) -> tuple[Structure, Parameters]:
+    """
+    Put a description into a model.
+
+    Parameters
+    ----------
+    structure : Structure
+    parameters : Parameters
+    description : Description
+
+    Returns
+    -------
+    Structure
+    Parameters
+    """
+    values = dict(zip(KNOTS, description.knots, strict=True))
+    values['range_low'], values['range_high'] = description.range
+    entries = [p.parameter(min(max(values[p.name], p.lower), p.upper))
+               for p in description.effect.parameters()]
+    return (structure.with_effect(replace(description.effect, late=False)),
+            parameters.with_entries(*entries))
