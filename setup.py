@@ -16,7 +16,7 @@ SHARE_FOLDERS = [*DATA_FOLDERS, *(folder for folder in ('launch',) if Path(folde
 EXTRAS = {
     'fast': ['numba>=0.59'],
     'plot': ['matplotlib>=3.6'],
-    'bags': ['rosbags>=0.10.10'],
+    'bags': ['rosbags>=0.11'],
     # cyclonedds ships no wheel for Linux on ARM and none after Python 3.13.
     'dds': [
         'cyclonedds>=0.10.5,!=11.0.0; python_version < "3.14"'

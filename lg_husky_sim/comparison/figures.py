@@ -53,6 +53,9 @@ STYLE: dict[Any, Any] = {
     'lines.solid_capstyle': 'round',
 }
 
+WIDEST = 95
+"""Letters of title and legend that fit beside one another."""
+
 
 @dataclass(frozen=True)
 class LineStyle:
@@ -146,7 +149,7 @@ def draw_trajectory(
 
 def draw_tracking_error(
     axes: Axes, tracks: Mapping[str, Tracking], axis: int, styles: Mapping[str, LineStyle],
-    start: float = 0.0,
+    start: float = 0.0, *, named: bool = True,
 ) -> None:
     """
     Draw the tracking error of one axis over time, with its largest size.
@@ -160,6 +163,8 @@ def draw_tracking_error(
     styles : mapping of str to LineStyle
     start : float
         Time that becomes zero [s].
+    named : bool
+        Whether the labels stand beside the bounds in the legend.
     """
     name = 'XY'[axis]
     axes.axhline(0.0, color='#333333', linewidth=0.8)
@@ -168,7 +173,7 @@ def draw_tracking_error(
         bound = track.bounds[axis]
         axes.plot(track.times - start, track.error[:, axis], color=style.colour,
                   linestyle=style.dash, linewidth=style.width,
-                  label=f'{label}: |{name}| ≤ {bound:.4g} m')
+                  label=f'{label}: ' * named + f'|{name}| ≤ {bound:.4g} m')
     axes.set_ylabel(f'{name.lower()} error [m]')
     axes.margins(x=0.01)
     axes.legend(loc='best', frameon=True, framealpha=0.8, edgecolor='none')
@@ -248,13 +253,13 @@ def trajectory_figure(
         upper = figure.add_subplot(grid[0, 1])
         lower = figure.add_subplot(grid[1, 1], sharex=upper)
         draw_trajectory(left, tracks, styles, end)
-        left.set_title('(a) Trajectory')
+        left.set_title(_entitled('(a) Trajectory', segment, end))
         for place, axes in enumerate((upper, lower)):
-            draw_tracking_error(axes, tracks, place, styles, segment.start)
+            draw_tracking_error(axes, tracks, place, styles, segment.start, named=False)
         upper.set_title('(b) Tracking error')
         upper.tick_params(labelbottom=False)
         lower.set_xlabel('time [s]')
-        _heading(figure, _entitled(title, segment, end), [left])
+        _heading(figure, title, [left])
     return figure
 
 
@@ -265,14 +270,18 @@ def _entitled(title: str, segment: Segment, end: float) -> str:
 
 
 def _heading(figure: Figure, title: str, axes: Iterable[Axes]) -> None:
-    """Put the title and one legend for all axes above them."""
+    """Put the title and one legend for all axes above them, in the space of the title."""
     found: dict[str, Any] = {}
     for each in axes:
         for handle, label in zip(*each.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
-    figure.suptitle(title, x=0.01, ha='left', fontsize=11, fontweight='bold')
-    figure.legend(list(found.values()), list(found), loc='outside upper right',
-                  ncols=max(1, len(found)))
+    crowded = len(title) + sum(len(label) + 8 for label in found) > WIDEST
+    figure.suptitle((title or ' ') + ('\n ' if crowded else ''), x=0.01, ha='left', fontsize=11,
+                    fontweight='bold')
+    row = 1.0 - 0.25 / figure.get_figheight() if crowded else 1.0  # the second line of the title
+    figure.legend(list(found.values()), list(found), ncol=max(1, len(found)), borderaxespad=0.1,
+                  loc='upper left' if crowded else 'upper right',
+                  bbox_to_anchor=(0.0 if crowded else 1.0, row))
 
 
 def _gaps(series: TimeSeries) -> FloatArray:

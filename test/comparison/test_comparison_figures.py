@@ -40,7 +40,7 @@ def test_responses_and_trajectory(
         measured, predicted = axes.get_lines()
         assert (measured.get_label(), predicted.get_label()) == ('measured', 'paper')
         assert np.nanmax(predicted.get_xdata()) <= 10.0
-    assert figure.get_suptitle() == 'a drive – first 10 s of 27 s'
+    assert 'a drive – first 10 s of 27 s' in [text.get_text() for text in figure.texts]
     tracks = {'paper': tracking(segment, prediction['paper'])}
     figure = trajectory_figure(segment, tracks, styles, 'a drive')
     assert figure.axes[0].get_aspect() == 1.0
