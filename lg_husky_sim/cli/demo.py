@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import sys
 
 import click
 
@@ -44,7 +45,8 @@ def command(out: Path, manoeuvre: str, model: str) -> None:
     isolate(os.environ, domain=10 + os.getpid() % 80)
     with result_folder(out, MARKER) as made:
         with tqdm(total=round(script.duration, 2), desc=f'driving the {script.name}',
-                  bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s') as bar:
+                  bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s',
+                  mininterval=0.1 if sys.stderr.isatty() else 5.0) as bar:
             demo = run_demo(script, made / 'bag', settings, model,
                             progress=lambda moment: bar.update(moment - bar.n))
         drive = read_drive(made / 'bag', settings.command_topic,

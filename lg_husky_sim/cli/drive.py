@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+import sys
 
 import click
 
@@ -38,7 +39,8 @@ def command(manoeuvre: str, preset: str, topic: str | None, kind: str | None, wa
     api.init(args=[])
     try:
         with tqdm(total=round(script.duration, 2), unit='s', desc=script.name,
-                  bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s') as bar:
+                  bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s',
+                  mininterval=0.1 if sys.stderr.isatty() else 5.0) as bar:
             sent = drive(script, settings, wait=wait,
                          progress=lambda moment: bar.update(moment - bar.n))
     finally:
