@@ -7,12 +7,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from lg_husky_sim.linear_graph.elements import Branch, TwoPort
+from lg_husky_sim.linear_graph.elements import Branch, SOURCES, TwoPort
 from lg_husky_sim.linear_graph.equations import Equations, latex_of, state_equations
+from lg_husky_sim.linear_graph.expressions import evaluate, names_in
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.numeric import NumericModel
 from lg_husky_sim.linear_graph.state_space import MATRICES
 from lg_husky_sim.linear_graph.symbolic import SymbolicStateSpace
+from lg_husky_sim.linear_graph.units import unit_needed
 
 _SHAPES = {'A': ('states', 'states'), 'B': ('states', 'inputs'), 'C': ('outputs', 'states'),
            'D': ('outputs', 'inputs'), 'E': ('states', 'inputs'), 'F': ('outputs', 'inputs'),
@@ -43,10 +45,16 @@ def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
     Returns
     -------
     str
+
+    Raises
+    ------
+    ParameterError
+        If a number is not allowed.
     """
+    poles = _poles(*numbers) if numbers is not None else ''     # refuses numbers not allowed
     parts = [title, '=' * len(title), '', steps.text]
     if graph is not None:
-        parts += ['', 'Values of the elements', *_values(graph)]
+        parts += ['', 'Values of the elements', *_values(graph, numbers[1] if numbers else {})]
     parts += ['', 'State-space model', f'  x = [{", ".join(model.states)}]',
               f'  u = [{", ".join(model.inputs)}]', f'  y = [{", ".join(model.outputs)}]']
     if model.efforts:
@@ -59,19 +67,27 @@ def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
         matrix = getattr(model, name)
         if _is_shown(name, matrix):
             parts += [f'{name} ({" by ".join(_SHAPES[name])})', *_table(matrix), '']
-    if numbers is not None:
-        parts.append(_poles(*numbers))
-    return '\n'.join(parts).rstrip()
+    return '\n'.join((*parts, poles)).rstrip()
 
 
 def _is_shown(name: str, matrix: Any) -> bool:
     return 0 not in matrix.shape and (name in 'ABCD' or not matrix.is_zero_matrix)
 
 
-def _values(graph: LinearGraph) -> list[str]:
+def _values(graph: LinearGraph, numbers: Mapping[str, float]) -> list[str]:
+    """List each element's expression, and its number and unit where all parameters have one."""
+    lines = []
     elements: list[Branch | TwoPort] = [*graph.branches, *graph.two_ports]
-    return [f'  {element.name} = {element.value}' for element in elements
-            if element.characteristic is None and element.value]
+    for element in elements:
+        source = isinstance(element, Branch) and element.kind in SOURCES
+        if element.characteristic is not None or source:
+            continue
+        parts = [element.name] + [element.value] * (element.value != element.name)
+        if all(name in numbers for name in names_in(element.value)):
+            parts.append(f'{evaluate(element.value, numbers):g} {unit_needed(element)}')
+        if len(parts) > 1:
+            lines.append('  ' + ' = '.join(parts))
+    return lines
 
 
 def _table(matrix: Any) -> list[str]:

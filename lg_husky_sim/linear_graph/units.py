@@ -150,7 +150,8 @@ def unit_needed(element: Branch | TwoPort) -> str:
     if isinstance(element, TwoPort):
         (one, *_), (two, *_) = element.port1, element.port2
         other = _ACROSS_UNIT if element.kind is Kind.TRANSFORMER else _THROUGH_UNIT
-        return f'({_ACROSS_UNIT[one]})/({other[two]})'
+        return '/'.join(f'({unit})' if re.search(r'[·/]', unit) else unit
+                        for unit in (_ACROSS_UNIT[one], other[two]))
     if element.kind in SOURCES:
         across = element.kind is Kind.ACROSS_SOURCE
         return (_ACROSS_UNIT if across else _THROUGH_UNIT)[element.domain]

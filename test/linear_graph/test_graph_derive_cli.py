@@ -19,7 +19,7 @@ def test_the_paper_s_graph_is_derived_step_by_step(capsys: pytest.CaptureFixture
             'Husky, simplified drivetrain', '  V(L_1) = V(V_S1) - V(R_1) - V(T_ML.1)',
             '  x = [omega(J_LW), omega(J_RW), v(M_H), omega(J_H), i(L_1), i(L_2)]',
             '  (4,3) = (-B_FL*TF_3*TF_4 - B_FR*TF_5*TF_6 - B_RL*TF_1*TF_2 - B_RR*TF_7*TF_8)/J_H',
-            '  T_ML = torque_constant*gear_ratio',
+            '  T_ML = torque_constant*gear_ratio = 3.50165 V/(rad/s)',
             'Poles with the numbers of the model [1/s]: -1663.81, -1663.8, -460.108, -459.992, '
             '-8.83951, -3.59308'):
         assert line in shown.splitlines(), line

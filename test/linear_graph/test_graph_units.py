@@ -112,7 +112,7 @@ def test_two_ports_and_units_of_elements_themselves() -> None:
                    (Domain.FLUID, 'q', 'ground'), '1/d')
     graph = LinearGraph((), (motor, pump))
     assert check_units(graph, {'k': 'N·m/A', 'n': '1', 'd': 'm³/rad'}) == ()
-    with pytest.raises(GraphError, match=r"unit of 'k': k\*n .* transformer, which needs \(V\)"):
+    with pytest.raises(GraphError, match=r"unit of 'k': k\*n .* transformer, which needs V"):
         check_units(graph, {'k': 'N·m', 'n': '1', 'd': 'm³'})
     with pytest.raises(GraphError, match=r"unit of 'p': .* gyrator"):
         check_units(graph, {'d': 'm²'})
