@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import itertools
 import math
 import time
 from typing import Any
@@ -97,7 +98,7 @@ def test_odometry_is_steady_and_complete(graph: Graph) -> None:
     rate = (len(graph.odom) - count) / (time.monotonic() - begun)
     assert 49.0 <= rate <= 51.0
     stamps = [nanoseconds(m) for m in graph.odom]
-    assert all(abs(b - a - PERIOD_NS) <= 1 for a, b in zip(stamps[:-1], stamps[1:], strict=True))
+    assert all(abs(b - a - PERIOD_NS) <= 1 for a, b in itertools.pairwise(stamps))
     last = graph.odom[-1]
     assert (last.header.frame_id, last.child_frame_id) == ('odom', 'base_link')
     for covariance in (last.pose.covariance, last.twist.covariance):
@@ -163,7 +164,8 @@ def test_wheel_angles_are_the_integral_of_their_rates(graph: Graph) -> None:
 def test_imu_reads_gravity_turning_and_centripetal_force(graph: Graph) -> None:
     """T4: gyro z, a_y = v·omega, a_z = +9.81 (REP-145), covariances set."""
     graph.send(0.5, 0.4, 2.0)
-    graph.imu.clear(), graph.truth.clear()
+    graph.imu.clear()
+    graph.truth.clear()
     graph.send(0.5, 0.4, 0.3)
     truth = {nanoseconds(m): m for m in graph.truth}
     pairs = [(m, truth[nanoseconds(m)]) for m in graph.imu if nanoseconds(m) in truth]
@@ -199,7 +201,8 @@ def test_all_messages_of_a_step_carry_one_stamp(graph: Graph) -> None:
 def test_wheel_odometry_differs_from_the_truth_by_slip(graph: Graph) -> None:
     """T14: on a turn the controller's odometry (multiplier 1.875) and the truth part."""
     graph.send(0.3, 0.8, 2.0)
-    graph.truth.clear(), graph.odom.clear()
+    graph.truth.clear()
+    graph.odom.clear()
     graph.send(0.3, 0.8, 0.3)
     truth = {nanoseconds(m): m for m in graph.truth}
     wheels, true = next((m, truth[nanoseconds(m)]) for m in reversed(graph.odom)
@@ -223,7 +226,7 @@ def test_pause_step_and_resume_by_topic(graph: Graph) -> None:
     graph.probe.spin(0.1)
     assert len(graph.truth) == 7
     stamps = [nanoseconds(m) for m in graph.truth]
-    assert all(abs(b - a - PERIOD_NS) <= 1 for a, b in zip(stamps[:-1], stamps[1:], strict=True))
+    assert all(abs(b - a - PERIOD_NS) <= 1 for a, b in itertools.pairwise(stamps))
     graph.step.publish(graph.uint(data=0))
     assert graph.said('step = 0 refused')
     graph.pause.publish(graph.bool(data=False))

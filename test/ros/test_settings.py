@@ -1,0 +1,58 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The table of parameters: complete, checked, and the same in every file that repeats it."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.resources import config_path
+from lg_husky_sim.ros.settings import BY_NAME, make_settings, preset_values, Settings, TABLE
+from lg_husky_sim.yaml_files import read_yaml
+import pytest
+
+
+def test_table_dataclass_and_presets_name_the_same_parameters() -> None:
+    """A parameter cannot be in one and forgotten in another."""
+    names = [setting.name for setting in TABLE]
+    assert [field.name for field in fields(Settings)] == names
+    for preset in BY_NAME['preset'].choices:
+        assert set(preset_values(preset)) == set(names)
+        assert make_settings(preset=preset).preset == preset
+
+
+def test_the_sample_parameter_file_holds_the_defaults() -> None:
+    """config/sim_node.yaml changes nothing when it is given to the node."""
+    data = read_yaml(config_path('sim_node.yaml'), SettingsError)
+    given = data['/**']['ros__parameters']
+    assert make_settings(given) == make_settings()
+    assert set(given) == set(BY_NAME)
+
+
+@pytest.mark.parametrize(('values', 'message'), [
+    ({'spede': 1.0}, r'parameter spede is unknown; did you mean speed\?'),
+    ({'rate': 0.5}, 'rate = 0.5 is not allowed: from 1 to 1000 Hz'),
+    ({'rate': float('nan')}, 'rate = nan is not allowed'),
+    ({'rate': 'fast'}, "rate = 'fast' is str, not float: from 1 to 1000 Hz"),
+    ({'rate': True}, 'rate = True is bool, not float'),
+    ({'seed': -1}, 'seed = -1 is not allowed'),
+    ({'seed': 1.5}, 'seed = 1.5 is float, not int'),
+    ({'command_type': 'Pose'}, 'one of Twist, TwistStamped'),
+    ({'joint_names': ['a', 'b', 'c', 'a']}, 'four different names'),
+    ({'odometry_covariance': [1.0] * 5}, 'six positive numbers'),
+    ({'odometry_covariance': [1.0] * 5 + [0.0]}, 'six positive numbers'),
+    ({'imu_rate': 100.0}, 'imu_rate = 100 Hz must be rate = 50 Hz divided by a whole number'),
+    ({'preset': 'husky'}, 'one of paper, husky_ros1, clearpath_jazzy'),
+])
+def test_every_mistake_says_what_is_allowed(values: dict[str, object], message: str) -> None:
+    """T17: name, value and range stand in the message."""
+    with pytest.raises(SettingsError, match=message):
+        make_settings(values)
+
+
+def test_sensor_rates_become_steps() -> None:
+    """A sensor at a tenth of the rate reports every tenth step."""
+    settings = make_settings(rate=200.0, imu_rate=100.0, joint_states_rate=20.0)
+    assert (settings.every('imu_rate'), settings.every('joint_states_rate')) == (2, 10)
+    assert settings.period == 0.005
