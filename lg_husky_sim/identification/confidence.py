@@ -99,8 +99,8 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     Returns
     -------
     Confidence
-        Variances are the larger of the sandwich's and of the curvature's, so that few blocks do
-        not feign accuracy; intervals by Student's t over the blocks.
+        Variances are the larger of the curvature's and of the sandwich's, the latter widened by
+        Student's t, so that few blocks do not feign accuracy.
     """
     observations, metric = problem.observations, problem.metric
     white = metric.whiten(observations, observations.measured - solution.predicted)
@@ -120,11 +120,14 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     level = max(float(np.mean(white ** 2)), 0.25)
     plain = bread * level
     sandwich = bread @ meat @ bread
-    variances = np.maximum(np.diag(sandwich), np.diag(plain))
+    # The scatter of few blocks is itself uncertain: Student's t widens it, and only it.
+    normal = float(stats.norm.ppf(0.5 + 0.5 * LEVEL))
+    student = float(stats.t.ppf(0.5 + 0.5 * LEVEL, max(blocks - count, 1)))
+    variances = np.maximum(np.diag(sandwich) * (student / normal) ** 2, np.diag(plain))
     lift = np.sqrt(variances / np.maximum(np.diag(plain), 1e-300))
     covariance = plain * np.outer(lift, lift)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    reach = float(stats.t.ppf(0.5 + 0.5 * LEVEL, max(blocks - count, 1))) * deviations
+    reach = normal * deviations
     varied = [u.varied(solution.values[u.name]) for u in solution.unknowns]
     low = [u.value(v - r) for u, v, r in zip(solution.unknowns, varied, reach, strict=True)]
     high = [u.value(v + r) for u, v, r in zip(solution.unknowns, varied, reach, strict=True)]

@@ -85,7 +85,7 @@ def _dask(function: Callable[[Task], Outcome], tasks: Sequence[Task], scheduler:
         raise FitError(f'no Dask scheduler answers at {scheduler!r}') from error
     with client:
         futures = client.map(function, tasks, pure=False)
-        for _ in dask.as_completed(futures):
+        for _ in dask.as_completed(futures, loop=client.loop):
             tell()
         results: list[Outcome] = client.gather(futures)
         return results

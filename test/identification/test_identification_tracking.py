@@ -1,0 +1,121 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Eq. (23) for many candidates: exact against expm, the simulator and plain arrays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lg_husky_sim.errors import FitError
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model import compile_model, Structure
+from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.identification import lanes
+from lg_husky_sim.identification.halves import can_split, HalvesMaker
+from lg_husky_sim.identification.options import with_effects
+from lg_husky_sim.identification.tracking import PERIOD, track_of, TrackingObjective
+from lg_husky_sim.jit import SWITCH
+from lg_husky_sim.recording import Segment
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+FREE = ('wheel_damping', 'yaw_damping', 'command_gain')
+DRAWS = np.random.default_rng(7).uniform([1.0, 1.0, 0.75], [100.0, 100.0, 1.0], (40, 3))
+
+
+def maker(husky: ModelFile, free: tuple[str, ...] = FREE) -> HalvesMaker:
+    return HalvesMaker(compile_model(husky.structure), husky.parameters, free)
+
+
+def test_operators_equal_the_matrix_exponential(husky: ModelFile) -> None:
+    halves = maker(husky)(DRAWS)
+    found = lanes.operators(halves, PERIOD)
+    for k in (0, 17, 39):
+        for half in range(2):
+            block = np.zeros((5, 5))
+            block[:3, :3], block[:3, 4] = halves.a[k, half], halves.b[k, half]
+            block[3, 1] = 1.0
+            exact = expm(block * PERIOD)[:4][:, [0, 1, 2, 4]]
+            np.testing.assert_allclose(found[half, :, :, k], exact, rtol=1e-9, atol=1e-11)
+
+
+def test_halves_have_the_poles_of_the_graph(husky: ModelFile) -> None:
+    model = compile_model(husky.structure)
+    values = dict(zip(FREE, DRAWS[0], strict=True))
+    whole = np.linalg.eigvals(model.at(husky.parameters.replacing(values)).sets[0].a)
+    halves = maker(husky)(DRAWS[:1])
+    split = np.concatenate([np.linalg.eigvals(halves.a[0, half]) for half in range(2)])
+    np.testing.assert_allclose(np.sort(split.real), np.sort(whole.real), rtol=1e-9)
+
+
+def test_dampings_are_learnt_as_affine_and_masses_are_not(husky: ModelFile) -> None:
+    assert maker(husky).affine
+    by_mass = maker(husky, ('mass', 'wheel_damping'))
+    assert not by_mass.affine
+    candidate = np.array([[60.0, 5.0]])
+    exact = maker(ModelFile(husky.structure, husky.parameters.replacing(
+        {'mass': 60.0, 'wheel_damping': 5.0})), FREE)(np.array([[5.0, 12.865, 0.8961]]))
+    np.testing.assert_allclose(by_mass(candidate).a, exact.a, rtol=1e-12)
+
+
+def test_batch_equals_the_simulator(husky: ModelFile, circle: Segment) -> None:
+    model = compile_model(husky.structure)
+    objective = TrackingObjective(model, husky.parameters, FREE, [circle])
+    assert objective.batched
+    track = track_of(circle)
+    assert track is not None
+    costs = objective(DRAWS[:5])
+    for row, cost in zip(DRAWS[:5], costs, strict=True):
+        plant = model.at(husky.parameters.replacing(dict(zip(FREE, map(float, row),
+                                                             strict=True))))
+        alone = np.abs(track.simulate(plant) - track.targets).sum()
+        assert cost == pytest.approx(alone, rel=1e-9)
+
+
+def test_a_cost_does_not_depend_on_its_company(husky: ModelFile, circle: Segment) -> None:
+    objective = TrackingObjective(compile_model(husky.structure), husky.parameters, FREE,
+                                  [circle])
+    together = objective(DRAWS)
+    assert together[23] == objective(DRAWS[23:24])[0]
+    assert together.shape == (40,)
+
+
+def test_without_numba_the_numbers_are_the_same(husky: ModelFile, circle: Segment,
+                                                monkeypatch: pytest.MonkeyPatch) -> None:
+    objective = TrackingObjective(compile_model(husky.structure), husky.parameters, FREE,
+                                  [circle])
+    compiled = objective(DRAWS[:6])
+    monkeypatch.setenv(SWITCH, '1')
+    np.testing.assert_allclose(objective(DRAWS[:6]), compiled, rtol=1e-9)
+
+
+def test_positions_between_steps_are_interpolated(husky: ModelFile, circle: Segment) -> None:
+    pose = circle.streams['pose']
+    late = replace(circle, streams={**circle.streams, 'pose': type(pose)(
+        pose.times + 0.007, pose.values, pose.names).slice(0.0, circle.end)})
+    track = track_of(late)
+    assert track is not None
+    np.testing.assert_allclose(track.times, late.streams['pose'].times, atol=1e-12)
+    objective = TrackingObjective(compile_model(husky.structure), husky.parameters, (), [late])
+    plant = compile_model(husky.structure).at(husky.parameters)
+    assert objective(np.zeros((1, 0)))[0] == pytest.approx(
+        np.abs(track.simulate(plant) - track.targets).sum(), rel=1e-9)
+
+
+def test_models_that_do_not_split_run_one_by_one(husky: ModelFile, circle: Segment) -> None:
+    lopsided = with_effects(husky, ['viscous_asymmetry:left'])
+    model = compile_model(lopsided.structure)
+    assert not can_split(model, lopsided.parameters)
+    assert not can_split(compile_model(Structure(effects=(Effect('command_latency'),))),
+                         with_effects(husky, ['command_latency']).parameters)
+    objective = TrackingObjective(model, lopsided.parameters, FREE, [circle])
+    assert not objective.batched
+    assert np.all(np.isfinite(objective(DRAWS[:2])))
+    assert objective(np.array([[-1.0, 1.0, 0.9]]))[0] == np.inf
+
+
+def test_a_drive_without_pose_has_no_objective(husky: ModelFile, circle: Segment) -> None:
+    blind = replace(circle, streams={k: v for k, v in circle.streams.items() if k != 'pose'})
+    with pytest.raises(FitError, match='needs a pose'):
+        TrackingObjective(compile_model(husky.structure), husky.parameters, FREE, [blind])
