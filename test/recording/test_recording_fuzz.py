@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 LONGEST = 2.0
-"""No damaged bag may take longer than this [s]; a sound one takes some milliseconds."""
+"""No damaged bag may take more computing time than this [s]; a sound one takes milliseconds."""
 
 
 def _attempt(path: Path) -> str:
     """Read a damaged bag; return 'refused' or 'read', and check either."""
-    before = time.monotonic()
+    before = time.process_time()
     try:
         recording = read_recording(path)
         segments(recording)
@@ -31,7 +31,7 @@ def _attempt(path: Path) -> str:
             assert np.all(np.isfinite(series.values))
             assert np.all(np.diff(series.times) > 0.0)
         message = ''
-    assert time.monotonic() - before < LONGEST
+    assert time.process_time() - before < LONGEST
     if not message:
         return 'read'
     assert '\n' not in message
