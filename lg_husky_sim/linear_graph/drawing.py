@@ -10,13 +10,16 @@ from pathlib import Path
 import tempfile
 from typing import Any
 
-from lg_husky_sim.errors import GraphError, MissingExtraError
+from lg_husky_sim.errors import GraphError
+from lg_husky_sim.extras import require
 from lg_husky_sim.linear_graph.elements import Domain
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.layout import Block, Curve, HEIGHT, layout, Point
 from lg_husky_sim.linear_graph.normal_tree import normal_tree
 
 FORMATS = ('.svg', '.png', '.pdf')
+SCALE = 0.62    # inches a drawing unit
+HEADING = 0.45  # inches
 _COLOURS = {
     Domain.ELECTRICAL: '#8a5a00', Domain.TRANSLATIONAL: '#1b5fa6', Domain.ROTATIONAL: '#1d7a46',
     Domain.FLUID: '#6b3fa0', Domain.THERMAL: '#a83232'}
@@ -51,7 +54,7 @@ def draw_graph(axes: Any, graph: LinearGraph, *, culprits: Collection[str] = (),
             raise GraphError(f'cannot mark {name!r}: there is no such branch in the graph')
     tree = set(normal_tree(graph).tree)
     blocks = layout(graph)
-    middles: dict[str, tuple[Point, str]] = {}
+    middles: dict[str, Point] = {}
     for block in blocks:
         _panel(axes, block)
         for edge in graph.edges:
@@ -62,11 +65,11 @@ def draw_graph(axes: Any, graph: LinearGraph, *, culprits: Collection[str] = (),
                             _NEW if names & set(new) else _COLOURS[block.domain]),
                         thick=edge.name in tree, dashed=bool(names & set(new)),
                         halo=bool(names & set(culprits)))
-                middles[edge.name] = (block.edges[edge.name].at(0.5), _COLOURS[block.domain])
+                middles[edge.name] = block.edges[edge.name].at(0.5)
         _nodes(axes, block)
     for two_port in graph.two_ports:
-        _link(axes, middles[f'{two_port.name}.1'][0], middles[f'{two_port.name}.2'][0])
-    _legend(axes, blocks, bool(culprits), bool(new))
+        _link(axes, middles[f'{two_port.name}.1'], middles[f'{two_port.name}.2'])
+    _legend(axes, bool(graph.two_ports), bool(culprits), bool(new))
     right = max(block.x + block.width for block in blocks)
     axes.set_xlim(-0.5, max(right, 7.0) + 0.5)
     axes.set_ylim(min(block.y for block in blocks) - 1.5, 1.2)
@@ -123,7 +126,8 @@ def _nodes(axes: Any, block: Block) -> None:
         at_top = y - block.y >= HEIGHT - 1e-9
         axes.text(x if at_top else x - 0.15, y + 0.16 if at_top else y, name, fontsize=6.5,
                   color='0.3', ha='center' if at_top else 'right',
-                  va='bottom' if at_top else 'center', style='italic', zorder=6)
+                  va='bottom' if at_top else 'center', style='italic', zorder=8,
+                  bbox={'facecolor': 'white', 'alpha': 0.7, 'edgecolor': 'none', 'pad': 0.4})
 
 
 def _link(axes: Any, one: Point, two: Point) -> None:
@@ -134,14 +138,15 @@ def _link(axes: Any, one: Point, two: Point) -> None:
         linestyle=(0, (1.0, 2.2)), zorder=1.5))
 
 
-def _legend(axes: Any, blocks: tuple[Block, ...], culprits: bool, new: bool) -> None:
+def _legend(axes: Any, two_ports: bool, culprits: bool, new: bool) -> None:
     from matplotlib.lines import Line2D
 
     entries = [Line2D([], [], color='0.2', linewidth=3.0, label='tree branch'),
                Line2D([], [], color='0.2', linewidth=1.0, label='link'),
-               Line2D([], [], color='0.25', linewidth=3.2, marker='|', label='ground'),
-               Line2D([], [], color='0.55', linewidth=0.8, linestyle=':',
-                      label='two ports of one element')]
+               Line2D([], [], color='0.25', linewidth=3.2, marker='|', label='ground')]
+    if two_ports:
+        entries.append(Line2D([], [], color='0.55', linewidth=0.8, linestyle=':',
+                              label='two ports of one element'))
     if culprits:
         entries.append(Line2D([], [], color=_CULPRIT, linewidth=3.0, label='suspected'))
     if new:
@@ -183,22 +188,21 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
         raise GraphError(f'picture {str(path)!r} must end in {", ".join(FORMATS)}')
-    try:
-        from matplotlib import rc_context
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingExtraError("pictures need matplotlib: pip install 'lg_husky_sim[plot]'"
-                                ) from error
+    require('matplotlib', 'draw graphs')
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     blocks = layout(graph)
     width = max(max(block.x + block.width for block in blocks), 7.0) + 1.0
     height = -min(block.y for block in blocks) + 2.8
-    figure = Figure(figsize=(width * 0.62, height * 0.62))
+    inches = height * SCALE + (HEADING if title else 0.0)
+    figure = Figure(figsize=(width * SCALE, inches))
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.01, 0.01, 0.98, 0.95 if title else 0.98))
+    axes = figure.add_axes((0.0, 0.0, 1.0, height * SCALE / inches))
     draw_graph(axes, graph, culprits=culprits, new=new)
     if title:
-        axes.set_title(title, fontsize=11)
+        figure.suptitle(title, fontsize=11, y=1.0 - 0.4 * HEADING / inches, va='center')
     # a fixed salt and no date: the same graph gives the same file
     with tempfile.TemporaryDirectory(dir=path.parent) as folder, rc_context(
             {'svg.hashsalt': 'lg_husky_sim', 'svg.fonttype': 'none'}):
