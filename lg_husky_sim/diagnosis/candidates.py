@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 import itertools
 import math
 
-from lg_husky_sim.husky.effects import Effect, catalogue
+from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.parameters import Parameter, Parameters
-from lg_husky_sim.identification.least_squares import (
-    Unknown, effect_unknown, nominal_unknown)
+from lg_husky_sim.identification.least_squares import effect_unknown, nominal_unknown, Unknown
 
 #: Parameters that a recalibration moves, with the relative deviation that is believed possible
 #: for a nominal value; None takes the tolerance of the model file.

@@ -7,14 +7,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-import numpy as np
-from scipy.stats import chi2
-
+from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.result import Estimate
-from lg_husky_sim.diagnosis.search import Fit
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
+import numpy as np
+from scipy.stats import chi2
 
 #: Half width of a 95 % interval in standard deviations.
 TWO_SIDED = 1.96

@@ -7,18 +7,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from lg_husky_sim.diagnosis import judge
+from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
 from lg_husky_sim.diagnosis.mismatches import mismatches
 from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
-from lg_husky_sim.diagnosis.search import Fit, Progress, Search, search
+from lg_husky_sim.diagnosis.rounds import MUCH
+from lg_husky_sim.diagnosis.search import Progress, Search, search
+from lg_husky_sim.diagnosis.unnamed import described_structure, look_for_unnamed, Unnamed
 from lg_husky_sim.errors import DiagnosisError
+from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.recording import Recording, Segment, segments
+import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,26 +126,38 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
 def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
                whole: Observations) -> Diagnosis:
     names = judge.findings(found)
-    numbers = judge.recalibration(found, nominal.parameters)
     verdict = Verdict.KNOWN if names else Verdict.NOTHING_MISSING
+    unnamed = None
+    if not names or found.rounds[-1].rest > MUCH:
+        unnamed = look_for_unnamed(whole, found.final)
+    model = model_of(found.final, '; '.join(f.statement for f in names)
+                     or 'recalibrated, nothing added', with_intervals(found, nominal.parameters))
+    final = plant_of(found.final)
+    if not names and unnamed is not None and judge.is_unnamed(found, unnamed):
+        verdict = Verdict.UNKNOWN
+        finding, described = judge.unnamed_finding(found, unnamed)
+        names = (finding,)
+        if described is not None:
+            structure, parameters = described_structure(found.final.structure,
+                                                        found.final.parameters, described)
+            model = ModelFile(structure, parameters, finding.statement)
+            final = compile_model(structure).at(parameters)
     residual = whole.measured - found.plain.solution.predicted
     best = found.rounds[-1].base if not found.rounds[-1].adopted else found.final
     culprit = names[0].subsystem if names else None
     listed = mismatches(whole, residual, whole.measured - best.solution.predicted, culprit)
-    metric = found.rounds[-1].metric
     plain_out, augmented_out = held_out_errors(
-        found.plain, found.final, nominal.parameters, own, whole, metric)
-    about = '; '.join(f.statement for f in names) or 'recalibrated, nothing added'
+        found.plain, found.final, nominal.parameters, own, whole, found.rounds[-1].metric)
     return Diagnosis(
-        verdict, judge.confidence(found), names,
-        judge.indistinguishable(found, nominal.parameters), listed, numbers,
-        errors(plant_of(found.plain), own), errors(plant_of(found.final), own),
-        plain_out, augmented_out, _remaining(found),
-        model_of(found.final, about, with_intervals(found, nominal.parameters)),
+        verdict, judge.confidence(found, verdict), names,
+        judge.indistinguishable(found, nominal.parameters), listed,
+        judge.recalibration(found, nominal.parameters),
+        errors(plant_of(found.plain), own), errors(final, own),
+        plain_out, augmented_out, _remaining(found, unnamed), model,
         model_of(found.plain, 'recalibrated, nothing added'), _notes(found))
 
 
-def _remaining(found: Search) -> str:
+def _remaining(found: Search, unnamed: Unnamed | None) -> str:
     last = found.rounds[-1]
     residual = (found.observations.measured - found.final.solution.predicted)
     words = []
@@ -154,6 +169,10 @@ def _remaining(found: Search) -> str:
     if best is not None:
         text += (f'; the best further effect would be {best.effect.id} with a held-out gain of '
                  f'{best.held_out:.0f} nats, which is not enough to adopt it')
+    if unnamed is not None and unnamed.held_out > 0.0:
+        first = unnamed.descriptions[0]
+        text += (f'; the best smooth description of the rest is {judge.description_words(first)}'
+                 f' with a held-out gain of {first.held_out:.0f} nats')
     return text
 
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import math
 
-from lg_husky_sim.comparison.metrics import SquareSum, channel_errors, pooled, tracking
+from lg_husky_sim.comparison.metrics import channel_errors, pooled, SquareSum, tracking
 from lg_husky_sim.comparison.replay import replay
-from lg_husky_sim.diagnosis.search import Fit, fit_structure
+from lg_husky_sim.diagnosis.fits import first_metric, Fit, fit_structure
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import Plant
@@ -121,7 +121,6 @@ def refitted(fit: Fit, nominal: Parameters, train: Observations, whole: Observat
         The given one where the refit cannot be evaluated.
     """
     del whole
-    from lg_husky_sim.diagnosis.search import first_metric
     white = first_metric(train, train.predict(plant_of(fit)))
     weighted = replace(white, filters=metric.filters)
     sizes = {**fit.parameters, **fit.solution.values}

@@ -6,18 +6,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
+from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.regimes import where_it_shows
-from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry
-from lg_husky_sim.diagnosis.search import (
-    Rival, Round, Search, folds_of, held_out_cost)
+from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
+from lg_husky_sim.diagnosis.rounds import Rival, Round
+from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
+from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.parameters import Parameters
+import numpy as np
 
+#: Gain from which something is missing, whatever it is [nats].
+CERTAIN = 32.0
 #: A rival within this share of the winner's held-out gain, or this many nats, is as good.
 NEAR_SHARE = 0.06
 NEAR_NATS = 10.0
@@ -118,13 +121,82 @@ def indistinguishable(search: Search, nominal: Parameters) -> tuple[Indistinguis
     return tuple(found)
 
 
-def confidence(search: Search) -> float:
+def is_unnamed(search: Search, unnamed: Unnamed) -> bool:
+    """
+    Return whether something is missing although nothing could be named.
+
+    Parameters
+    ----------
+    search : Search
+        That adopted nothing.
+    unnamed : Unnamed
+        What smooth descriptions explain.
+
+    Returns
+    -------
+    bool
+        Whether an effect or a description explains more than chance, however little of it.
+    """
+    first = search.rounds[0]
+    screened = first.scores[0].gain if first.scores else 0.0
+    tried = max((r.held_out for r in first.rivals), default=0.0)
+    return screened > CERTAIN or tried > CERTAIN or (
+        unnamed.held_out > CERTAIN and unnamed.share > 0.0)
+
+
+def description_words(description: Description) -> str:
+    """Return a smooth description in words."""
+    effect = description.effect
+    words = effect.kind.title.replace('{shape}', effect.shape.replace('_', ' '))
+    return words + _side_words(effect)
+
+
+def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Description | None]:
+    """
+    Return the finding of an unknown effect.
+
+    Parameters
+    ----------
+    search : Search
+    unnamed : Unnamed
+
+    Returns
+    -------
+    Finding
+        With the most likely subsystem.
+    Description or None
+        The description to put into the model, where it predicts held-out data better.
+    """
+    first = search.rounds[0]
+    rivals = tuple(Rivalry(r.effect.id, r.effect.side, r.held_out) for r in first.rivals)
+    near = max(first.rivals, key=lambda r: r.held_out, default=None)
+    best = unnamed.descriptions[0] if unnamed.descriptions else None
+    described = best is not None and best.held_out > CERTAIN and unnamed.share > 0.0
+    if described and best is not None and (near is None or best.held_out > 0.5 * near.held_out):
+        kind = best.effect.kind
+        words = (f'Something is missing that is not in the catalogue. It is described best by '
+                 f'{description_words(best)}, between {min(best.knots):.3g} and '
+                 f'{max(best.knots):.3g} {kind.parameters[-1].unit}.')
+        gain = best.held_out
+    else:
+        effect = near.effect if near is not None else first.scores[0].signature.candidate.effect
+        kind = effect.kind
+        gain = near.held_out if near is not None else first.scores[0].gain
+        words = (f'Something is missing that is not in the catalogue; the nearest entry, '
+                 f'{effect.id}, explains {100.0 * max(first.share, 0.0):.1f} % of it.')
+    return Finding('unknown', 'none', kind.subsystem.value, kind.elements, 'not determined',
+                   None, (), gain, p_value(gain, 9, len(candidates())), unnamed.share, rivals,
+                   words), best if described else None
+
+
+def confidence(search: Search, verdict: Verdict) -> float:
     """
     Return how sure the verdict and the first name are.
 
     Parameters
     ----------
     search : Search
+    verdict : Verdict
 
     Returns
     -------
@@ -132,9 +204,11 @@ def confidence(search: Search) -> float:
         Between 0 and 1.
     """
     first = search.rounds[0]
-    if not first.adopted:
-        strongest = max((r.held_out for r in first.rivals), default=0.0)
-        return float(1.0 / (1.0 + np.exp((strongest - 8.0) / 6.0)))
+    strongest = max((r.held_out for r in first.rivals), default=0.0)
+    if verdict is Verdict.NOTHING_MISSING:
+        return float(1.0 / (1.0 + np.exp((strongest - 20.0) / 6.0)))
+    if verdict is Verdict.UNKNOWN:
+        return float(1.0 / (1.0 + np.exp(-(strongest - CERTAIN) / 15.0)) * 0.5 + 0.4)
     by_name: dict[str, float] = {}
     for rival in first.rivals:
         by_name[rival.effect.id] = max(by_name.get(rival.effect.id, -np.inf), rival.held_out)

@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from lg_husky_sim.diagnosis.result import Mismatch
 from lg_husky_sim.identification.noise import spread
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
+import numpy as np
 
 #: Smoothing of the residual [s], and the deviations from which a stretch counts.
 SMOOTH = 0.8

@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 
 from lg_husky_sim.diagnosis.diagnose import Case
-from lg_husky_sim.diagnosis.result import Diagnosis, Verdict, diagnosis_data
+from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Verdict
 from lg_husky_sim.husky.model_file import save_model
 
 #: File that marks a folder of this kind.

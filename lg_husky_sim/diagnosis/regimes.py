@@ -6,11 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lg_husky_sim.identification.problem import Observations, Piece
 from lg_husky_sim.signals import FloatArray
+import numpy as np
+from numpy.typing import NDArray
 
 #: Speeds and rates below these count as none [m/s, rad/s]; the low speed; accelerations [m/s²].
 STILL = 0.03

@@ -15,17 +15,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lg_husky_sim.diagnosis.candidates import Candidate, effect_entries, neutral
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Onset, OnsetKind
-from lg_husky_sim.husky.model import Structure, compile_model
+from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
+import numpy as np
+from numpy.typing import NDArray
 
 #: Time between two moments at which an onset is tried [s].
 ONSET_STEP = 1.5
@@ -186,7 +185,7 @@ class Projector:
         Sums
         """
         white = self.metric.whiten(self.observations, columns)
-        size, k = white.shape
+        k = white.shape[1]
         onto = np.zeros((count, self.basis.shape[1], k))
         own = np.zeros((count, k, k))
         along = np.zeros((count, k))

@@ -16,18 +16,19 @@ from dataclasses import dataclass, replace
 import itertools
 import math
 
-import numpy as np
-
-from lg_husky_sim.diagnosis.screening import Projector, Signature, signatures_of
 from lg_husky_sim.diagnosis.candidates import Candidate
-from lg_husky_sim.husky.effects import Effect, descriptions
-from lg_husky_sim.husky.model import Structure
+from lg_husky_sim.diagnosis.evidence import energy, FOLDS, folds_of
+from lg_husky_sim.diagnosis.fits import extras_of, Fit, shared_metric
+from lg_husky_sim.diagnosis.screening import Projector, Signature, signatures_of
+from lg_husky_sim.husky.effects import descriptions, Effect
+from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.parameters import Parameters
-from lg_husky_sim.identification.problem import Observations, PERIOD, simulate_piece
 from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.identification.problem import Observations, PERIOD, simulate_piece
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.kernel import COLUMNS
 from lg_husky_sim.simulation.simulator import Simulator
+import numpy as np
 
 #: Column of the simulator that gives the range of an argument.
 _SOURCE = {'forward': 'forward', 'yaw': 'yaw_rate', 'x': 'x', 'y': 'y',
@@ -86,7 +87,7 @@ def ranges(observations: Observations, plant: Plant) -> dict[str, tuple[float, f
     simulator = Simulator(observations.plant_in(plant, observations.recordings[-1]), PERIOD,
                           fine_pose=False)
     rows = np.vstack([simulate_piece(simulator, piece) for piece in observations.pieces])
-    found = {name: (0.0, 2.0 * math.pi) for name in _PERIODIC}
+    found = dict.fromkeys(_PERIODIC, (0.0, 2.0 * math.pi))
     for argument, column in _SOURCE.items():
         low, high = np.quantile(rows[:, COLUMNS.index(column)], [0.005, 0.995])
         found[argument] = (float(low), float(max(high, low + 1e-3)))
@@ -117,7 +118,7 @@ def description_signatures(observations: Observations, structure: Structure,
     for name, kind in descriptions().items():
         for side, shape in itertools.product(kind.sides, kind.shapes):
             low, high = spans[shape]
-            start = {knot: _SIZE[name] for knot in KNOTS}
+            start = dict.fromkeys(KNOTS, _SIZE[name])
             candidate = Candidate(Effect(name, side, shape),
                                   ({**start, 'range_low': low, 'range_high': high},), True)
             found.extend(signatures_of(candidate, structure, parameters, extra, observations,
@@ -200,3 +201,66 @@ def described_structure(structure: Structure, parameters: Parameters, descriptio
                for p in description.effect.parameters()]
     return (structure.with_effect(replace(description.effect, late=False)),
             parameters.with_entries(*entries))
+
+
+@dataclass(frozen=True, eq=False)
+class Unnamed:
+    """
+    What smooth descriptions explain on top of a fit.
+
+    Parameters
+    ----------
+    descriptions : tuple of Description
+        Best first.
+    energy : float
+        Scaled sum of squares before [sensor noise per value, summed].
+    count : int
+        Values.
+    """
+
+    descriptions: tuple[Description, ...]
+    energy: float
+    count: int
+
+    @property
+    def share(self) -> float:
+        """Share of the unexplained energy that the best description explains."""
+        if not self.descriptions:
+            return 0.0
+        return (self.energy - self.descriptions[0].energy) / max(
+            self.energy - 0.5 * self.count, 1e-9)
+
+    @property
+    def held_out(self) -> float:
+        """Held-out gain of the best description [nats]; 0 without one."""
+        return self.descriptions[0].held_out if self.descriptions else 0.0
+
+
+def look_for_unnamed(observations: Observations, fit: Fit) -> Unnamed:
+    """
+    Rank smooth descriptions on top of a fit.
+
+    Parameters
+    ----------
+    observations : Observations
+    fit : Fit
+
+    Returns
+    -------
+    Unnamed
+    """
+    plant = compile_model(fit.structure).at(fit.parameters)
+    signatures = description_signatures(observations, fit.structure, fit.parameters,
+                                        extras_of(fit), plant, fit.solution.predicted)
+    metric = shared_metric(observations, fit, signatures)
+    unknowns = fit.solution.unknowns
+    deviations = np.array([u.deviation for u in unknowns])
+    pull = np.array([(u.centre - u.varied(fit.solution.values[u.name])) / u.deviation
+                     for u in unknowns])
+    residual = observations.measured - fit.solution.predicted
+    projector = Projector(observations, metric, residual, fit.solution.jacobian, deviations,
+                          pull)
+    ranked = describe(observations, signatures, projector, residual, folds_of(observations),
+                      FOLDS)
+    return Unnamed(ranked, energy(observations, fit, metric),
+                   int(np.count_nonzero(metric.scale)))

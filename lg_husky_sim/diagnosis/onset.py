@@ -1,0 +1,83 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Find the moment or the place at which a late effect begins, finely."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.fits import extras_of, Fit
+from lg_husky_sim.diagnosis.screening import ONSET_STEP, place_onsets, time_onsets
+from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.husky.effects import Onset, OnsetKind
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.identification.noise import Metric
+from lg_husky_sim.identification.problem import Observations
+import numpy as np
+
+#: Fine steps around the best coarse onset [s, m], and how far they go in coarse steps.
+FINE = {OnsetKind.TIME: 0.1, OnsetKind.PLACE_ABOVE: 0.05, OnsetKind.PLACE_BELOW: 0.05}
+REACH = 1.2
+#: Onsets within this many nats of the best are as good; their middle is taken.
+FLAT = 1.0
+
+
+def _cost(observations: Observations, fit: Fit, metric: Metric, onset: Onset) -> float:
+    try:
+        plant = compile_model(replace(fit.structure, onset=onset)).at(fit.parameters)
+    except LgHuskyError:
+        return np.inf
+    predicted = observations.predict(plant, extras_of(fit))
+    white = metric.whiten(observations, observations.measured - predicted)
+    cost = 0.5 * float(white @ white)
+    return cost if np.isfinite(cost) else np.inf
+
+
+def _middle(onsets: list[Onset], costs: list[float]) -> Onset:
+    # Of the onsets that are as good as the best and adjacent to it, the middle one.
+    best = int(np.argmin(costs))
+    low = high = best
+    while low > 0 and costs[low - 1] < costs[best] + FLAT:
+        low -= 1
+    while high + 1 < len(costs) and costs[high + 1] < costs[best] + FLAT:
+        high += 1
+    return onsets[(low + high) // 2]
+
+
+def refined_onset(observations: Observations, fit: Fit, metric: Metric) -> Onset | None:
+    """
+    Return a better onset for a fitted late effect.
+
+    Parameters
+    ----------
+    observations : Observations
+    fit : Fit
+        With an onset in its structure.
+    metric : Metric
+
+    Returns
+    -------
+    Onset or None
+        None where the structure has no onset.
+    """
+    onset = fit.structure.onset
+    if onset is None:
+        return None
+    family = (time_onsets if onset.kind is OnsetKind.TIME else place_onsets)(observations)
+    coarse = [o for o, _ in family.onsets
+              if o.kind is onset.kind and bool(o.recording) == bool(onset.recording)]
+    if onset.recording:
+        # Onsets in a named recording lie on one line through all recordings.
+        coarse.sort(key=lambda o: (observations.recordings.index(o.recording), o.value))
+    if onset not in coarse:
+        coarse.append(onset)
+    costs = [_cost(observations, fit, metric, o) for o in coarse]
+    centre = coarse[int(np.argmin(costs))]
+    step = ONSET_STEP
+    if onset.kind is not OnsetKind.TIME and len(coarse) > 1:
+        step = abs(coarse[1].value - coarse[0].value)
+    count = int(np.ceil(REACH * step / FINE[onset.kind]))
+    fine = [replace(centre, value=round(centre.value + k * FINE[onset.kind], 4))
+            for k in range(-count, count + 1)]
+    fine = [o for o in fine if o.value >= 0.0 or onset.kind is not OnsetKind.TIME]
+    return _middle(fine, [_cost(observations, fit, metric, o) for o in fine])

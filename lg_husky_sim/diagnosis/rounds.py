@@ -1,0 +1,294 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One round: screen every candidate, refit the serious ones, compare them, judge the best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from lg_husky_sim.diagnosis.candidates import Candidate, neutral
+from lg_husky_sim.diagnosis.evidence import energy, held_out_cost, instability
+from lg_husky_sim.diagnosis.fits import at_nominal, extras_of, Fit, fit_structure, shared_metric
+from lg_husky_sim.diagnosis.screening import (
+    Onsets,
+    Projector,
+    scan,
+    Score,
+    Signature,
+    signatures_of,
+)
+from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.husky.effects import Effect, Onset
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.identification.noise import Metric
+from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Candidates that are refitted in a round.
+SERIOUS = 6
+#: Of these, those that are refitted to the end.
+POLISHED = 4
+#: Least held-out gain of an adopted effect, always there or late [nats].
+LEAST_GAIN = (18.0, 40.0)
+#: Least share of the unexplained energy that the first effect must explain, always there or
+#: late: where the rest is near the sensors' noise, and where much remains unexplained.
+LEAST_SHARE = (0.003, 0.02)
+LARGE_SHARE = (0.03, 0.06)
+#: Energy per value of the rest from which much remains unexplained.
+MUCH = 7.0
+#: The same for a further effect: share, or a smaller one with a large gain.
+FURTHER_SHARE = 0.2
+FURTHER_GAIN = (100.0, 0.06)
+#: Largest ratio of losses to gains over held-out blocks.
+UNSTABLE = 0.35
+#: What a late effect must gain more than the same one without an onset: nats and share.
+LATER = (12.0, 0.08)
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """
+    A candidate as it was refitted in one round.
+
+    Parameters
+    ----------
+    effect : Effect
+    onset : Onset or None
+    fit : Fit
+    gain : float
+        Drop of the half sum of squares against the round's base, all data [nats].
+    held_out : float
+        The same on blocks that were not fitted [nats].
+    """
+
+    effect: Effect
+    onset: Onset | None
+    fit: Fit
+    gain: float
+    held_out: float
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """
+    One round of the search.
+
+    Parameters
+    ----------
+    base : Fit
+        What it began with.
+    scores : tuple of Score
+        The screening, best first.
+    rivals : tuple of Rival
+        The refitted candidates, best held-out gain first.
+    metric : Metric
+        Under which they were compared.
+    share : float
+        Share of the base's unexplained energy that the best one explains.
+    adopted : bool
+    instability : float
+        Of the best one's gain over held-out blocks.
+    rest : float
+        Energy per value that the best one leaves, in units of the sensors' noise.
+    """
+
+    base: Fit
+    scores: tuple[Score, ...]
+    rivals: tuple[Rival, ...]
+    metric: Metric
+    share: float
+    adopted: bool
+    instability: float = 0.0
+    rest: float = 1.0
+
+
+def play_round(observations: Observations, base: Fit, nominal: Parameters,
+               pool: Sequence[Candidate], masks: Sequence[Onsets], folds: FloatArray,
+               number: int, only_late: bool = False) -> Round:
+    """
+    Play one round of the search.
+
+    Parameters
+    ----------
+    observations : Observations
+    base : Fit
+    nominal : Parameters
+    pool : sequence of Candidate
+    masks : sequence of Onsets
+        Onsets to try.
+    folds : numpy.ndarray
+    number : int
+        Effects that were adopted before.
+    only_late : bool
+        Whether only effects with an onset are asked for.
+
+    Returns
+    -------
+    Round
+    """
+    taken = {(e.id, e.side) for e in base.structure.effects}
+    signatures = [s for c in pool if (c.effect.id, c.effect.side) not in taken
+                  for s in signatures_of(c, base.structure, base.parameters, extras_of(base),
+                                         observations, base.solution.predicted)]
+    common = shared_metric(observations, base, signatures)
+    late = base.structure.onset is None or only_late
+    scores = screen(observations, base, common, signatures, masks if late else ())
+    plain_metric = Metric(common.scale, {name: np.ones(1) for name in common.filters})
+    broad = screen(observations, base, plain_metric, signatures, masks if late else ())
+    if only_late:
+        scores = [s for s in scores if s.onset is not None]
+        broad = [s for s in broad if s.onset is not None]
+    serious = _serious(scores, SERIOUS)
+    chosen = {(s.signature.candidate.label, s.onset is None) for s in serious}
+    serious += [s for s in _serious(broad, SERIOUS // 2)
+                if (s.signature.candidate.label, s.onset is None) not in chosen]
+    nominal_fit = at_nominal(observations, base, nominal)
+    quick = []
+    for score in serious:
+        tries = [refit(observations, near, nominal, score, common)
+                 for near in (base, nominal_fit) if near is not None]
+        best_try = min((t for t in tries if t is not None),
+                       key=lambda t: t.solution.cost, default=None)
+        if best_try is not None:
+            quick.append((score, best_try))
+    near = sorted(quick, key=lambda pair: pair[1].solution.cost)[:POLISHED]
+    fits = [(score, refit(observations, base, nominal, score, common, 4, fit))
+            for score, fit in near]
+    usable = [(score, fit) for score, fit in fits if fit is not None]
+    rebased = fit_structure(observations, base.structure, nominal, common,
+                            base.solution.values, base.parameters) or base
+    if not usable:
+        count = float(np.count_nonzero(common.scale))
+        return Round(rebased, tuple(scores), (), common, 0.0, False, 1.0,
+                     energy(observations, rebased, common) / count)
+    best = min(usable, key=lambda pair: pair[1].solution.cost)[1]
+    final = shared_metric(observations, best, [])
+    cost_base = held_out_cost(observations, rebased, final, folds)
+    rivals = []
+    for score, fit in usable:
+        cost = held_out_cost(observations, fit, final, folds)
+        white = [0.5 * float(np.sum(final.whiten(
+            observations, observations.measured - f.solution.predicted) ** 2))
+            for f in (rebased, fit)]
+        rivals.append(Rival(fit.structure.effects[-1], score.onset, fit,
+                            white[0] - white[1], float(np.sum(cost_base - cost))))
+    rivals.sort(key=lambda r: -_rank(r))
+    before = energy(observations, rebased, final)
+    after = energy(observations, rivals[0].fit, final)
+    count = float(np.count_nonzero(final.scale))
+    share = (before - after) / max(before - 0.5 * count, 1e-9)
+    cost = held_out_cost(observations, rivals[0].fit, final, folds)
+    unstable = instability(observations, cost_base - cost)
+    rest = after / count
+    adopted = _adopts(rivals[0], share, unstable, rest, number, only_late)
+    return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted, unstable, rest)
+
+
+def _rank(rival: Rival) -> float:
+    # Held-out gain, less what an onset must bring.
+    if rival.onset is None:
+        return rival.held_out
+    return rival.held_out - LATER[0] - LATER[1] * abs(rival.held_out)
+
+
+def _adopts(best: Rival, share: float, unstable: float, rest: float, number: int,
+            change: bool) -> bool:
+    late = int(best.onset is not None and not change)
+    if best.held_out < LEAST_GAIN[late] or unstable > UNSTABLE:
+        return False
+    if number > 0:
+        return share > FURTHER_SHARE or (
+            best.held_out > FURTHER_GAIN[0] and share > FURTHER_GAIN[1] and rest < MUCH)
+    return share > (LARGE_SHARE if rest > MUCH else LEAST_SHARE)[late]
+
+
+def screen(observations: Observations, base: Fit, metric_: Metric,
+           signatures: Sequence[Signature], masks: Sequence[Onsets]) -> list[Score]:
+    """
+    Score all signatures under one metric.
+
+    Parameters
+    ----------
+    observations : Observations
+    base : Fit
+    metric_ : Metric
+    signatures : sequence of Signature
+    masks : sequence of Onsets
+
+    Returns
+    -------
+    list of Score
+        Best first.
+    """
+    unknowns = base.solution.unknowns
+    deviations = np.array([u.deviation for u in unknowns])
+    pull = np.array([(u.centre - u.varied(base.solution.values[u.name])) / u.deviation
+                     for u in unknowns])
+    projector = Projector(observations, metric_, observations.measured - base.solution.predicted,
+                          base.solution.jacobian, deviations, pull)
+    return scan(projector, signatures, masks)
+
+
+def _serious(scores: Sequence[Score], most: int) -> list[Score]:
+    # The best few, at most two variants of one effect; an onset only where it clearly helps.
+    plain = {s.signature.candidate.label: s.gain for s in scores if s.onset is None}
+    chosen: list[Score] = []
+    counts: dict[str, int] = {}
+    for score in scores:
+        name = score.signature.candidate.effect.id
+        without = plain.get(score.signature.candidate.label, 0.0)
+        if score.onset is not None and score.gain < 1.1 * without + 15.0:
+            continue
+        if counts.get(name, 0) >= 2:
+            continue
+        counts[name] = counts.get(name, 0) + 1
+        chosen.append(score)
+        if len(chosen) >= most:
+            break
+    return chosen
+
+
+def _sized(score: Score) -> dict[str, float]:
+    # Values of an effect's parameters from a score's multiples.
+    candidate = score.signature.candidate
+    start = dict(score.signature.start)
+    if candidate.signed:
+        return {name: neutral(name) + float(np.clip(size, -8.0, 8.0)) * (value - neutral(name))
+                for (name, value), size in zip(start.items(), score.size, strict=True)}
+    return start
+
+
+def refit(observations: Observations, base: Fit, nominal: Parameters, score: Score,
+          metric_: Metric, steps: int = 2, start: Fit | None = None) -> Fit | None:
+    """
+    Put a scored candidate into the base and refit everything.
+
+    Parameters
+    ----------
+    observations : Observations
+    base : Fit
+    nominal : Parameters
+    score : Score
+    metric_ : Metric
+    steps : int
+    start : Fit, optional
+        Where an earlier, shorter refit of the same candidate ended; it is then polished.
+
+    Returns
+    -------
+    Fit or None
+    """
+    effect = replace(score.signature.candidate.effect, late=score.onset is not None)
+    try:
+        structure = base.structure.with_effect(effect, score.onset)
+    except LgHuskyError:
+        return None
+    sized = _sized(score)
+    sizes = {**{name: base.parameters[name] for e in base.structure.effects
+                for name in (p.name for p in e.parameters())}, **sized}
+    begin = {**base.solution.values, **sized} if start is None else dict(start.solution.values)
+    near = base if start is None else None
+    return fit_structure(observations, structure, nominal, metric_, begin, sizes, steps,
+                         near, polish=start is not None)
