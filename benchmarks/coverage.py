@@ -3,8 +3,8 @@
 """
 How often the 95 % intervals of `identify` contain the truth, over synthetic recordings.
 
-Run ``python benchmarks/coverage.py --count 200``. Every recording is the paper's circle driven by a
-robot of random dampings and command gain, once with white sensor noise and once with noise that
+Run ``python benchmarks/coverage.py --count 200``. Every recording is the paper's circle driven by
+a robot of random dampings and command gain, once with white sensor noise and once with noise that
 is correlated over half a second on top of it.
 """
 
@@ -80,8 +80,8 @@ def main() -> None:
     parser.add_argument('--count', type=int, default=200)
     parser.add_argument('--jobs', type=int, default=1)
     arguments = parser.parse_args()
-    print(f'{"noise":<12}{"parameter":<16}{"contained":>12}{"share":>8}{"95 % range of the share":>26}'
-          f'{"median error":>14}')
+    print(f'{"noise":<12}{"parameter":<16}{"contained":>12}{"share":>8}'
+          f'{"95 % range of the share":>26}{"median error":>14}')
     for correlated in (False, True):
         tasks = [Task(seed, correlated) for seed in range(arguments.count)]
         with tqdm(total=len(tasks), disable=None, leave=False) as bar:
