@@ -6,9 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import itertools
+import json
 import math
 from pathlib import Path
 import signal
+import subprocess
+import sys
 import time
 from typing import Any
 
@@ -23,6 +26,13 @@ Start = Callable[..., LiveHusky]
 def stamp(message: Any) -> int:
     """Return the header's stamp [ns]."""
     return int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec)
+
+
+def caught(node: NodeProcess, number: signal.Signals) -> bool:
+    """Return whether main() has begun: the process has a handler of its own for a signal."""
+    status = Path(f'/proc/{node.process.pid}/status').read_text(encoding='ascii')
+    mask = next(line for line in status.splitlines() if line.startswith('SigCgt'))
+    return bool(int(mask.split()[1], 16) >> (number - 1) & 1)
 
 
 def test_first_odometry_comes_within_two_seconds(probe: Probe, start: Start) -> None:
@@ -167,21 +177,35 @@ MISTAKES = (
 
 def test_mistakes_end_with_one_line_and_exit_code_one(probe: Probe) -> None:
     """T17: the message names the thing, its value and what is allowed; no traceback."""
-    nodes = [NodeProcess(arguments=words) for words, _ in MISTAKES]
-    for node, (_, text) in zip(nodes, MISTAKES, strict=True):
-        assert node.process.wait(40.0) == 1
-        assert text in node.log()
-        assert 'Traceback' not in node.log()
-        lines = [line for line in node.log().splitlines() if line.startswith('error: ')]
+    program = ('import json, sys\n'
+               'from lg_husky_sim.ros.sim_node import main\n'
+               'for words in json.loads(sys.argv[1]):\n'
+               "    print('exit', main(['sim_node', '--ros-args', *words]), flush=True)")
+    told = subprocess.run(
+        [sys.executable, '-c', program, json.dumps([words for words, _ in MISTAKES])],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60.0, check=True)
+    parts = told.stdout.split('exit 1\n')
+    assert len(parts) == len(MISTAKES) + 1
+    for part, (_, text) in zip(parts, MISTAKES, strict=False):
+        lines = [line for line in part.splitlines() if line.startswith('error: ')]
         assert len(lines) == 1
+        assert text in lines[0]
+        assert 'Traceback' not in part
+
+
+def test_a_mistake_ends_the_process_with_exit_code_one(probe: Probe) -> None:
+    """The exit code reaches the shell."""
+    node = NodeProcess({'spede': 2.0})
+    assert node.process.wait(30.0) == 1
 
 
 @pytest.mark.parametrize(('number', 'after'), [
-    (signal.SIGINT, 0.3), (signal.SIGTERM, 0.4), (signal.SIGINT, 0.8), (signal.SIGTERM, 2.0)])
+    (signal.SIGINT, 0.0), (signal.SIGTERM, 0.1), (signal.SIGINT, 0.5), (signal.SIGTERM, 2.0)])
 def test_signals_end_the_node_cleanly_at_any_moment(
         probe: Probe, number: signal.Signals, after: float) -> None:
     """Ctrl-C and SIGTERM while importing, starting and running: exit code 0, no traceback."""
     node = NodeProcess()
+    assert probe.until(lambda: caught(node, signal.SIGTERM))
     time.sleep(after)
     assert node.stop(number) == 0, node.log()
     assert 'Traceback' not in node.log()
