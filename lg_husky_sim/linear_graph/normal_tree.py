@@ -27,6 +27,7 @@ from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.modular import (
     Elimination,
     generic_numbers,
+    generic_value,
     IntArray,
     is_regular,
     PRIME,
@@ -128,8 +129,8 @@ def _interconnection(graph: LinearGraph, leave_out: frozenset[str] = frozenset()
         rows[row, count + branch] = 1
         rows[row, [count + link for link in links]] = loops[row - len(links)]
     ports = []
-    numbers = generic_numbers(len(graph.two_ports))
-    for at, (two_port, ratio) in enumerate(zip(graph.two_ports, numbers, strict=True)):
+    for at, two_port in enumerate(graph.two_ports):
+        ratio = generic_value(two_port.value or two_port.name)
         one, two = (graph.edge_index(f'{two_port.name}.{port}') for port in (1, 2))
         first, second = count + 2 * at, count + 2 * at + 1
         if two_port.kind is Kind.TRANSFORMER:

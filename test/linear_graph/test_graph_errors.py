@@ -55,8 +55,8 @@ def build(*branches: Branch, two_ports: tuple[TwoPort, ...] = ()) -> Callable[[]
     return lambda: compile_numeric(LinearGraph(branches, two_ports))
 
 
-def transformer(name: str, one: str, two: str) -> TwoPort:
-    return TwoPort(name, Kind.TRANSFORMER, (E, one, 'ground'), (E, two, 'ground'), name)
+def transformer(name: str, one: str, two: str, ratio: str = '') -> TwoPort:
+    return TwoPort(name, Kind.TRANSFORMER, (E, one, 'ground'), (E, two, 'ground'), ratio or name)
 
 
 MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
@@ -133,6 +133,11 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         build(*RC, resistor('R_2', 'd'),
               two_ports=(transformer('n', 'b', 'd'), transformer('k', 'b', 'd'))),
         r'no state: .* not fixed by sources and two-ports alone'),
+    'transformers of equal ratio in parallel': (
+        build(*RC, resistor('R_2', 'd'),
+              two_ports=(transformer('n', 'b', 'd', '2*p/q'),
+                         transformer('k', 'b', 'd', 'p/(q/2)'))),
+        r"two-port '[nk]' has a variable that nothing determines.*doubled"),
     'storage held at zero': (
         build(*RC, resistor('R_2', 'd'), inductor('L', 'a'),
               two_ports=(transformer('n', 'b', 'd'), transformer('k', 'b', 'd'))),
