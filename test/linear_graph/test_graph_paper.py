@@ -20,6 +20,7 @@ from lg_husky_sim.linear_graph import (
 from lg_husky_sim.linear_graph.equations import equations, latex_of, Sum
 from lg_husky_sim.linear_graph.netlist import read_netlist
 import numpy as np
+from numpy.typing import NDArray
 import pytest
 import sympy
 
@@ -94,6 +95,21 @@ def test_equations_are_written_as_text_and_latex(husky: LinearGraph) -> None:
     assert latex_of('omega(J_LW)') == r'\omega_{J_{LW}}'
     assert latex.count(r'\begin{align}') == latex.count(r'\end{align}') == 3
     assert latex.count('{') == latex.count('}')
+
+
+@pytest.mark.parametrize('graph', ['simplified', 'expanded', 'hydraulic'])
+@pytest.mark.parametrize('by_element', [True, False])
+def test_every_latex_equation_can_be_typeset(graph: str, by_element: bool) -> None:
+    mathtext = pytest.importorskip('matplotlib.mathtext', reason='matplotlib typesets here')
+    chosen = read_netlist(HYDRAULIC).graph if graph == 'hydraulic' else (
+        network.simplified() if graph == 'simplified' else network.expanded())
+    found = equations(chosen, by_element=by_element)
+    lines = [e.latex for e in (*found.continuity, *found.compatibility)]
+    lines += [e.latex for e in found.constitutive]
+    assert len(lines) > 10
+    parser = mathtext.MathTextParser('path')
+    for line in lines:
+        assert parser.parse(f'${line}$').width > 10.0
 
 
 def printed_a(inertia: str) -> sympy.Matrix:
@@ -196,6 +212,30 @@ def test_expanded_drivetrain_tends_to_the_simplified_one(
     soft = np.array(expanded_poles(100.0, 0.1, paper))
     assert np.abs(soft.imag).max() > 1.0    # a soft belt swings
     assert soft.real.max() < 0.0
+
+
+def stored_power(a: NDArray[np.float64], values: dict[str, float]) -> float:
+    """Return the largest growth of stored energy over all states of unit energy [1/s]."""
+    inertia = np.sqrt([values[n] for n in ('J_LW', 'J_RW', 'M_H', 'J_H', 'L_1', 'L_2')])
+    scaled = a * inertia[:, None] / inertia[None, :]
+    return float(np.linalg.eigvalsh(scaled + scaled.T).max())
+
+
+def test_the_husky_never_gains_energy_for_1000_draws_but_the_print_does(
+        husky: LinearGraph, paper: dict[str, float]) -> None:
+    model = compile_numeric(husky)
+    dice = np.random.default_rng(19)
+    gains = 0
+    for _ in range(1000):
+        values = {name: value * float(np.exp(dice.normal(scale=0.7)))
+                  for name, value in paper.items()}
+        a = model.at(values).A
+        scale = float(np.abs(a).max())
+        assert stored_power(a, values) <= 1e-9 * scale
+        printed = np.array(a)
+        printed[3, 2] *= values['J_H']      # eq. (19) lacks the divisor at (4, 3)
+        gains += stored_power(printed, values) > 1e-9 * scale
+    assert gains > 100      # unequal dampings make the printed model gain energy
 
 
 def test_battery_resistance_shared_by_both_motors_is_one_line_and_a_solved_loop(
