@@ -130,6 +130,14 @@ def parameter_overrides(node: Node) -> dict[str, Parameter]:
     return overrides
 
 
+def leave(node: Node) -> None:
+    """End spinning from inside a callback, as a signal does."""
+    if HAVE_RCLPY:
+        try_shutdown(context=node.context)  # type: ignore[call-arg]
+    else:
+        node.context.stop()
+
+
 def describe_backend(environment: Mapping[str, str] = os.environ) -> str:
     """Return backend, domain and discovery range in a line, for the first log message."""
     if HAVE_RCLPY:
@@ -160,6 +168,7 @@ __all__ = [
     'Time',
     'describe_backend',
     'init',
+    'leave',
     'message_type',
     'ok',
     'parameter_overrides',

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from lg_husky_sim.errors import LgHuskyError, SettingsError
@@ -15,7 +15,10 @@ from lg_husky_sim.ros.settings import Settings
 from lg_husky_sim.ros.wheel_odometry import WheelOdometry
 from lg_husky_sim.signals import BodyTwist, Pose
 from lg_husky_sim.simulation import Simulator, SimulatorState
+import numpy as np
 
+#: Place of the simulated time in the flat state, after the states (see the kernel's layout).
+TIME = 6
 #: Largest command that is handed on [m/s, rad/s]; the voltage is saturated long before.
 LARGEST = 1e6
 
@@ -133,7 +136,7 @@ class Engine:
         one = self.settings
         return Pose(one.initial_x, one.initial_y, one.initial_heading)
 
-    def _begin(self, pose: Pose, step: int) -> None:
+    def _begin(self, pose: Pose, step: int, twist: BodyTwist | None = None) -> None:
         one = self.settings
         self.step_count = step
         self._command = BodyTwist()
@@ -146,7 +149,7 @@ class Engine:
             self._sensors = Sensors(one)
         self._sensors.forget()
         self._angles = (0.0, 0.0)
-        self.state = self._simulator.initial(pose, time=step * one.period)
+        self.state = self._simulator.initial(pose, twist, time=step * one.period)
         self.reading = self._read()
 
     def command(self, twist: BodyTwist) -> bool:
@@ -203,9 +206,10 @@ class Engine:
             (self._torque * left, self._torque * right), self._supply,
             -(v_left * left + v_right * right) / self._supply)
 
-    def reset(self, pose: Pose | None = None, *, time: bool = False) -> Reading:
+    def reset(self, pose: Pose | None = None, *, time: bool = False,
+              twist: BodyTwist | None = None) -> Reading:
         """
-        Stand still somewhere, as after a start.
+        Begin anew somewhere, as after a start.
 
         Parameters
         ----------
@@ -213,9 +217,21 @@ class Engine:
             The initial pose of the settings if not given.
         time : bool
             Whether simulated time and the sensors' noise start anew as well.
+        twist : BodyTwist, optional
+            Motion to begin with; at rest if not given.
         """
-        self._begin(pose or self._initial_pose(), 0 if time else self.step_count)
+        self._begin(pose or self._initial_pose(), 0 if time else self.step_count, twist)
         return self.reading
+
+    def rewind(self) -> None:
+        """Begin simulated time anew and leave the robot as it is."""
+        state = self.state
+        flat = np.array(state.flat)
+        flat[state.n + TIME] = 0.0
+        flat.setflags(write=False)
+        self.state = replace(state, flat=flat)
+        self.step_count = 0
+        self.reading = replace(self.reading, step=0, time=0.0)
 
     def configure(self, settings: Settings) -> None:
         """

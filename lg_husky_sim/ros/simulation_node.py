@@ -9,15 +9,16 @@ import time
 from typing import Any
 
 from lg_husky_sim.ros import conversions
-from lg_husky_sim.ros.api import describe_backend, message_type, Node
+from lg_husky_sim.ros.api import describe_backend, leave, message_type, Node
 from lg_husky_sim.ros.control import Control
 from lg_husky_sim.ros.diagnostics import Diagnostics
-from lg_husky_sim.ros.engine import Engine
+from lg_husky_sim.ros.engine import Engine, Reading
 from lg_husky_sim.ros.outputs import Outputs
 from lg_husky_sim.ros.pacing import Pace, Stamps
 from lg_husky_sim.ros.parameters import declare_settings, LiveSettings
 from lg_husky_sim.ros.settings import Settings
-from lg_husky_sim.signals import Pose
+from lg_husky_sim.ros.standard_control import StandardControl
+from lg_husky_sim.signals import BodyTwist, Pose
 
 _SECOND = 1_000_000_000
 #: Shortest time between two looks at the clock [s]; above it, steps come in bunches.
@@ -62,7 +63,9 @@ class SimNode(Node):
         self._publish()
         self._live = LiveSettings(self, self.settings, self._apply)
         self._subscribe()
+        self.stopped = False
         self.control = Control(self, self)
+        self.standard = StandardControl(self, self)
         self._warm_up()
         self._resume()
         if started is not None:
@@ -200,6 +203,7 @@ class SimNode(Node):
 
     def pause(self, paused: bool) -> None:
         """Pause or resume; simulated time stands while paused."""
+        self.stopped = False
         if self.paused and not paused:
             self.paused = False
             self._resume()
@@ -207,6 +211,7 @@ class SimNode(Node):
 
     def advance(self, count: int) -> None:
         """Make steps while paused, as fast as possible."""
+        self.stopped = False
         for _ in range(count):
             self._step(0)
 
@@ -214,8 +219,37 @@ class SimNode(Node):
         """Go to the initial pose at rest; optionally begin simulated time anew."""
         self._restart(None, time=time)
 
-    def _restart(self, pose: Pose | None, *, time: bool) -> None:
-        self.engine.reset(pose, time=time)
+    def reset_clock(self) -> None:
+        """Begin simulated time anew and leave the robot as it is."""
+        self.engine.rewind()
+        self.outputs.forget()
+
+    def place(self, pose: Pose, twist: BodyTwist) -> None:
+        """Put the robot somewhere in some motion."""
+        self._restart(pose, time=False, twist=twist)
+
+    def stop(self) -> None:
+        """Pause, in the initial state at time zero."""
+        self.paused = True
+        self.reset(time=True)
+        self.stopped = True
+
+    def quit(self) -> None:
+        """End the node as Ctrl-C does, once the answer to the request is out."""
+        self.create_timer(0.2, lambda: leave(self))
+
+    @property
+    def reading(self) -> Reading:
+        """The last step."""
+        return self.engine.reading
+
+    @property
+    def odom_frame(self) -> str:
+        """Frame of poses."""
+        return self.settings.odom_frame
+
+    def _restart(self, pose: Pose | None, *, time: bool, twist: BodyTwist | None = None) -> None:
+        self.engine.reset(pose, time=time, twist=twist)
         self.outputs.forget()
         if self.paused:
             self._publish()
