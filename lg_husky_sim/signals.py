@@ -117,7 +117,7 @@ class TimeSeries:
             raise RecordingError(f'no channel {name!r}; there are {", ".join(self.names)}')
         return self.values[:, self.names.index(name)]
 
-    def slice(self, start: float, end: float) -> TimeSeries:
+    def slice(self, start: float, end: float) -> TimeSeries:  # noqa: A003
         """Return the samples with start <= stamp <= end [s]."""
         first = int(np.searchsorted(self.times, start, side='left'))
         last = int(np.searchsorted(self.times, end, side='right'))

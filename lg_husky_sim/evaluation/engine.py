@@ -246,4 +246,3 @@ def _row(data: Any, turns: float) -> list[float]:
     forward = math.cos(heading) * data.qvel[0] + math.sin(heading) * data.qvel[1]
     return [0.5 * (data.qvel[6] + data.qvel[7]), 0.5 * (data.qvel[8] + data.qvel[9]), forward,
             data.qvel[5], data.qpos[0], data.qpos[1], heading]
-

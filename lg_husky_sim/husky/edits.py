@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Each effect of the catalogue as an edit: of the graph, of the command stage or of the sensors."""
+"""Each effect of the catalogue as an edit of the graph, the command stage or the sensors."""
 
 from __future__ import annotations
 
@@ -127,9 +127,9 @@ _LETTER = {'left': ('L',), 'right': ('R',), 'both': ('L', 'R'), 'none': ('L', 'R
 def _axles(network: EditedNetwork, side: str) -> list[tuple[str, Branch]]:
     # Side letter and inertia on the motor's axle.
     names = {branch.name for branch in network.graph.branches}
-    return [(letter, branch_of(network.graph, 
-        f'J_{letter}W' if f'J_{letter}W' in names else f'J_R{letter}'))
-        for letter in _LETTER[side]]
+    chosen = [(letter, f'J_{letter}W' if f'J_{letter}W' in names else f'J_R{letter}')
+              for letter in _LETTER[side]]
+    return [(letter, branch_of(network.graph, name)) for letter, name in chosen]
 
 
 def _electrical(network: EditedNetwork, effect: Effect) -> EditedNetwork:
@@ -221,7 +221,8 @@ def _chassis(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         'yaw_pull': (Law.WHILE_MOVING, ('pull_moment', 'pull_speed'), (forward,)),
     }
     law, coefficients, of = rows[effect.id]
-    mass = branch_of(network.graph, 'M_H' if effect.kind.subsystem.value == 'translation' else 'J_H')
+    name = 'M_H' if effect.kind.subsystem.value == 'translation' else 'J_H'
+    mass = branch_of(network.graph, name)
     return network.with_force(f'F_{effect.id}', mass.domain, mass.tail, mass.head,
                               LawRow(law, coefficients), of)
 

@@ -115,7 +115,7 @@ class _Regime:
     def at(self, values: Mapping[str, float]) -> PlantSet:
         space: StateSpace = self.numeric.at(values)
         coefficients = np.zeros((self._laws.size, WIDTH))
-        for place, number in zip(self._places, eval(self._code, dict(GLOBALS), values),
+        for place, number in zip(self._places, eval(self._code, dict(GLOBALS), values),  # noqa: S307
                                  strict=True):
             coefficients[place] = number
         forward = space.C[2]

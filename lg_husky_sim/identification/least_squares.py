@@ -8,8 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 
-import numpy as np
-
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import EffectParameter
 from lg_husky_sim.husky.model import HuskyModel
@@ -18,6 +16,7 @@ from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
+import numpy as np
 
 
 @dataclass(frozen=True)

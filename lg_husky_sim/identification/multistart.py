@@ -66,7 +66,7 @@ class End:
 class Ends:
     """Where all starts ended, in the order of the starts."""
 
-    all: tuple[End, ...]
+    all: tuple[End, ...]  # noqa: A003
 
     @property
     def values(self) -> Mapping[str, float]:

@@ -14,12 +14,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import lfilter
-
-from lg_husky_sim.identification.problem import Observations
-from lg_husky_sim.signals import FloatArray
 
 #: Uncertainty of a stamp [s].
 STAMP = 0.004

@@ -16,15 +16,14 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.plant import Plant, SensorModel
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation.kernel import COLUMNS, run
-from lg_husky_sim.simulation.simulator import Simulator, hold
+from lg_husky_sim.simulation.simulator import hold, Simulator
+import numpy as np
+from numpy.typing import NDArray
 
 #: Grid of the simulation [s].
 PERIOD = 0.01

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import itertools
 import math
 
 from lg_husky_sim.husky.effects import OnsetKind
@@ -99,7 +100,7 @@ def _quadrature(step: float) -> tuple[FloatArray, FloatArray]:
     points, weights = np.polynomial.legendre.leggauss(POINTS)
     edges = [edge for edge in PANELS if edge < step * (1.0 - 1e-9)] + [step]
     times, shares = [], []
-    for left, right in zip(edges[:-1], edges[1:], strict=True):
+    for left, right in itertools.pairwise(edges):
         times.append(left + 0.5 * (right - left) * (points + 1.0))
         shares.append(0.5 * (right - left) * weights)
     return np.concatenate(times), np.concatenate(shares)
@@ -107,7 +108,7 @@ def _quadrature(step: float) -> tuple[FloatArray, FloatArray]:
 
 def _nodes(plant: PlantSet, a: FloatArray, b: FloatArray, g: FloatArray, step: float,
            times: FloatArray) -> FloatArray:
-    size, efforts = a.shape[0], g.shape[1]
+    size = a.shape[0]
     block = _block(a, b, g, step)
     pick = np.zeros((2, block.shape[0]))
     pick[0, :size - 4] = plant.rows[2]

@@ -182,7 +182,7 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
         if clamp > 0.0:
             u[0] = max(-clamp, min(clamp, u[0]))
             u[1] = max(-clamp, min(clamp, u[1]))
-        for part in range(substeps):
+        for _ in range(substeps):
             for i in range(n4):
                 start[i] = s[i]
                 end[i] = 0.0

@@ -31,6 +31,7 @@ SERVICES: dict[str, tuple[str, str]] = {
         'string[] names', 'rcl_interfaces/ParameterDescriptor[] descriptors'),
 }
 
+
 @lru_cache(maxsize=1)
 def store() -> Typestore:
     """

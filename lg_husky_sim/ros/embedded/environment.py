@@ -32,7 +32,7 @@ class Discovery:
     """
 
     domain: int
-    range: str
+    range: str  # noqa: A003
     peers: tuple[str, ...] = ()
 
     def xml(self, extra: str = '', pid: int | None = None) -> str:
