@@ -100,8 +100,8 @@ def genetic(objective: Objective, lower: FloatArray, upper: FloatArray, seed: in
     try:
         from deap import tools
     except ImportError as error:
-        raise MissingExtraError('the genetic algorithm needs the package deap: '
-                                'pip install deap') from error
+        raise MissingExtraError('deap is needed to run the genetic algorithm and is not '
+                                "installed: pip install 'lg_husky_sim[search]'") from error
     size = population or paper().population
     count = generations or paper().generations
     share = paper().crossover_fraction if crossover_fraction is None else crossover_fraction
