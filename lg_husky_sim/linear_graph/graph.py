@@ -97,6 +97,8 @@ class LinearGraph:
 
         object.__setattr__(self, 'branches', tuple(self.branches))
         object.__setattr__(self, 'two_ports', tuple(self.two_ports))
+        if not isinstance(self.ground, str):
+            object.__setattr__(self, 'ground', dict(self.ground))
         edges = [Edge(branch.name, branch.domain, (branch.domain, branch.tail),
                       (branch.domain, branch.head), branch) for branch in self.branches]
         for two_port in self.two_ports:
@@ -201,7 +203,19 @@ class LinearGraph:
         return f'{found.domain.across if is_across else found.domain.through}({found.name})'
 
     def with_branches(self, *elements: Branch | TwoPort) -> LinearGraph:
-        """Return the graph with more branches and two-ports."""
+        """
+        Return the graph with more branches and two-ports.
+
+        Raises
+        ------
+        GraphError
+            If the result is no valid graph.
+        TypeError
+            If something else is given.
+        """
+        for element in elements:
+            if not isinstance(element, Branch | TwoPort):
+                raise TypeError(f'{element!r} is neither a Branch nor a TwoPort')
         return replace(
             self,
             branches=self.branches + tuple(e for e in elements if isinstance(e, Branch)),

@@ -96,6 +96,10 @@ class NumericModel:
         self._layout()
         self._refuse_effort_loops()
 
+    def __reduce__(self) -> tuple[type[NumericModel], tuple[Structure, bool]]:
+        """Travel between processes as the structure alone; code objects cannot."""
+        return NumericModel, (self.structure, self.chained)
+
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters of all element values, not of the laws of efforts."""
@@ -293,13 +297,13 @@ class NumericModel:
                 number = evaluate(value.text, values)
             except (ArithmeticError, ValueError, TypeError) as error:
                 return ParameterError(f'element {shown} cannot be evaluated: {error}')
-            rules = {'positive': number > 0.0, 'not negative': number >= 0.0,
-                     'not zero': number != 0.0, 'any': True}
+            rules = {'positive': number >= SMALLEST, 'not negative': number >= 0.0,
+                     'not zero': abs(number) >= SMALLEST, 'any': True}
             if not (np.isfinite(number) and rules[value.rule]):
                 allowed = 'finite' if value.rule == 'any' else f'finite and {value.rule}'
                 return ParameterError(f'element {shown} = {number:g} is not allowed; '
                                       f'it must be {allowed}')
-        return ParameterError('an element has a value that is too small or not a number')
+        return ParameterError('the values of the elements are no single numbers')
 
 
 __all__ = ['NumericModel', 'compile_numeric']

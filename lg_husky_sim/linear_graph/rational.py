@@ -27,10 +27,12 @@ def to_sympy(text: str) -> Any:
     expression = _convert(parse(text))
     if expression.atoms(sympy.Function) or any(
             not power.exp.is_Integer for power in expression.atoms(sympy.Pow)):
-        positive = {symbol: sympy.Symbol(symbol.name, positive=True)
-                    for symbol in expression.free_symbols}
-        simpler = sympy.simplify(expression.subs(positive))
-        expression = simpler.subs({new: old for old, new in positive.items()})
+        # whoever writes abs() expects either sign
+        assumed = {'real' if expression.has(sympy.Abs) else 'positive': True}
+        special = {symbol: sympy.Symbol(symbol.name, **assumed)
+                   for symbol in expression.free_symbols}
+        simpler = sympy.simplify(expression.subs(special))
+        expression = simpler.subs({new: old for old, new in special.items()})
     return expression
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pickle
 import time
 
 from lg_husky_sim.husky import network
@@ -132,6 +133,23 @@ def test_graphs_are_edited_without_changing(husky: LinearGraph) -> None:
     assert husky.replacing(ratio).two_ports[0] == ratio
 
 
+def test_a_compiled_graph_travels_between_processes(
+        husky: LinearGraph, paper: dict[str, float]) -> None:
+    model = compile_numeric(husky, ['v(M_H)'])
+    copy = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(copy.at(paper).A, model.at(paper).A)
+    assert copy.outputs == ('v(M_H)',)
+
+
+def test_ground_names_are_copied_and_other_things_refused() -> None:
+    grounds = {E: 'gnd'}
+    graph = LinearGraph((Branch('C', Kind.A_TYPE, E, 'a', 'gnd', 'C'),), (), grounds)
+    grounds[E] = 'other'
+    assert graph.ground_of(E) == (E, 'gnd')
+    with pytest.raises(TypeError, match=r'is neither a Branch nor a TwoPort'):
+        graph.with_branches('R')  # type: ignore[arg-type]
+
+
 def test_forms_of_d_and_t_types() -> None:
     source = Branch('F', Kind.THROUGH_SOURCE, Domain.TRANSLATIONAL, 'ground', 'x')
     mass = Branch('m', Kind.A_TYPE, Domain.TRANSLATIONAL, 'x', 'ground', 'm')
@@ -171,3 +189,17 @@ def test_network_of_the_package_has_the_fixture_s_matrices(
     fixture = compile_numeric(husky).at(paper)
     assert ours.states == fixture.states
     np.testing.assert_allclose(ours.A, fixture.A, rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize('value', [
+    'sqrt(a)*b', 'a**0.5', 'pi*r**2', 'exp(a)/1e-05', 'abs(a - b)', '(a + b)**2', 'tanh(a) + 1',
+    '2', '1.5e-3', 'a**-2', 'sin(a)**2 + cos(a)**2', 'atan(a/b) - -a', 'cos(atan(a/b))',
+])
+def test_values_mean_the_same_in_numbers_and_symbols(value: str) -> None:
+    graph = LinearGraph((
+        Branch('V', Kind.ACROSS_SOURCE, E, 'a', 'ground'),
+        Branch('R', Kind.D_TYPE, E, 'a', 'b', value),
+        Branch('C', Kind.A_TYPE, E, 'b', 'ground', 'C')))
+    values = {'a': 0.5, 'b': 2.0, 'r': 3.0, 'C': 1.5}
+    symbol = derive(graph).A[0, 0].subs({sympy.Symbol(n): v for n, v in values.items()})
+    assert compile_numeric(graph).at(values).A[0, 0] == pytest.approx(float(symbol), rel=1e-12)
