@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 BEST = '#0072b2'
 MEAN = '#d55e00'
+#: Correlations below this are coloured, not written.
+SHOWN = 0.1
 
 
 def convergence_figure(history: FloatArray, title: str = '') -> Figure:
@@ -70,20 +72,21 @@ def certainty_figure(result: FitResult) -> Figure:
     count = len(result.estimates)
     names = [one.name for one in result.estimates]
     with rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 1.6 + 0.45 * count), layout='constrained')
-        left, right = figure.subplots(1, 2, width_ratios=(1.2, 1.0))
+        figure = Figure(figsize=(11.0, 2.0 + 0.42 * count), layout='constrained')
+        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
         _draw_intervals(left, result.estimates)
         right.grid(visible=False)
         image = right.imshow(result.correlation, cmap='RdBu_r', vmin=-1.0, vmax=1.0)
         for i in range(count):
             for j in range(count):
                 value = float(result.correlation[i, j])
-                right.text(j, i, f'{value:+.2f}', ha='center', va='center', fontsize=7.5,
-                           color='white' if abs(value) > 0.6 else 'black')
+                if abs(value) >= SHOWN:
+                    right.text(j, i, f'{value:+.2f}', ha='center', va='center', fontsize=7.0,
+                               color='white' if abs(value) > 0.6 else 'black')
         right.set_xticks(range(count), names, rotation=40, ha='right')
         right.set_yticks(range(count), names)
         right.set_title('Correlation')
-        figure.colorbar(image, ax=right, shrink=0.9)
+        figure.colorbar(image, ax=right, fraction=0.046, pad=0.04)
     return figure
 
 
@@ -99,4 +102,5 @@ def _draw_intervals(axes: Axes, estimates: Sequence[Estimated]) -> None:
     axes.invert_yaxis()
     axes.set_xlabel('95 % interval about the estimate [%]')
     axes.set_xscale('symlog', linthresh=10.0)
+    axes.xaxis.set_major_formatter('{x:g}')
     axes.set_title('Estimates')
