@@ -154,7 +154,7 @@ class Simulator:
         rates = np.array([twist.forward * command.volts_per_speed
                           + sign * twist.yaw * command.volts_per_rate for sign in (-1.0, 1.0)])
         one = self.plant.sets[0]
-        gains = one.rows[:4] @ np.linalg.solve(-one.a, one.b)
+        gains = one.rows[:4] @ np.linalg.lstsq(-one.a, one.b, rcond=None)[0]
         body = gains[2:] @ rates
         share = [twist.forward / body[0] if body[0] else 1.0,
                  twist.yaw / body[1] if body[1] else 1.0]
