@@ -82,8 +82,9 @@ def verdict(result: CaseResult) -> list[str]:
     if held:
         said.append('Largest held-out error: ' + ', '.join(
             f'{label} {worst(label):.3f} m' for label in result.labels) + '.')
-    ratio = [fit.values.get('yaw_damping', 0.0) / fit.values['wheel_damping']
-             for fit in result.fits.values() if 'wheel_damping' in fit.values]
+    known = [result.fits[label].values for label in (GENETIC, SQUARES)]
+    ratio = [values['yaw_damping'] / values['wheel_damping'] for values in known
+             if {'yaw_damping', 'wheel_damping'} <= set(values)]
     if len(ratio) == 2:
         said.append(
             f'B_H/B is {ratio[0]:.3g} by the genetic algorithm and {ratio[1]:.3g} by least '

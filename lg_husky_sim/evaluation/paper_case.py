@@ -16,13 +16,17 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.estimate import estimate
+from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.identification.result import FitResult, Method
 from lg_husky_sim.recording import Recording, Segment, segments
 from lg_husky_sim.signals import TimeSeries
 
 GENETIC = 'LG, genetic algorithm'
 SQUARES = 'LG, least squares'
+BASE = 'LG and base, least squares'
 NOMINAL = "LG, paper's numbers"
+#: What a base with a speed loop does to a command; the paper's model has none of it.
+BASE_EFFECTS = ('speed_loop', 'command_latency')
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +66,8 @@ class CaseResult:
     ----------
     case : Case
     fits : mapping of str to FitResult
-        The paper's genetic algorithm, and least squares on all outputs.
+        The paper's genetic algorithm, least squares on all outputs, and the same with what the
+        base does to a command.
     drives : tuple of Drive
     """
 
@@ -102,6 +107,8 @@ def evaluate_case(case: Case, model: ModelFile, seed: int,
     parts = {name: _longest(case.recordings[name]) for name in names}
     fits = {label: estimate(model, [parts[names[0]]], method=method, seed=seed, progress=tell)
             for label, method in ((GENETIC, Method.GENETIC), (SQUARES, Method.LEAST_SQUARES))}
+    extended = with_effects(model, BASE_EFFECTS)
+    fits[BASE] = estimate(extended, [parts[names[0]]], baseline=model, seed=seed, progress=tell)
     plants = {label: compile_model(fit.model.structure).at(fit.model.parameters)
               for label, fit in fits.items()}
     plants[NOMINAL] = compile_model(model.structure).at(model.parameters)

@@ -96,7 +96,8 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None]) -> 
             pictures = case_report.figures(result)
             for one in pictures:
                 (folder / f'{one.name}.png').write_bytes(one.png)
-            for kind, fit in zip(('ga', 'least_squares'), result.fits.values(), strict=True):
+            for kind, fit in zip(('ga', 'least_squares', 'base'), result.fits.values(),
+                                 strict=True):
                 save_model(fit.model, folder / f'{result.case.name}_{kind}.yaml')
             texts.append(case_report.text(result))
             sections.append(case_report.section(result, pictures))

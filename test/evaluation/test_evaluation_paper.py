@@ -33,7 +33,7 @@ def test_the_command_writes_tables_figures_and_models(evaluated: Path) -> None:
     names = {path.name for path in evaluated.iterdir()}
     assert {'index.html', 'evaluation.json', 'evaluation.txt'} < names
     assert {f'synthetic_fig{k}.png' for k in range(12, 17)} < names
-    for kind in ('ga', 'least_squares'):
+    for kind in ('ga', 'least_squares', 'base'):
         assert load_model(evaluated / f'synthetic_{kind}.yaml').parameters['wheel_damping'] > 0.0
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.errors import FitError
 from lg_husky_sim.evaluation.baselines import (
     driven,
@@ -125,6 +126,18 @@ def test_what_the_base_does_is_found_on_held_out_steps() -> None:
     table = steps_table(result)
     assert [row[0].split()[0] for row in table.rows][:2] == ['wheel_left', 'wheel_right']
     assert steps_data(result)['steps'] == 10
+
+
+def test_a_follower_without_controller_starts_in_motion() -> None:
+    model = with_effects(load_model(), ['speed_loop'])
+    plant = compile_model(model.structure).at(model.parameters.replacing(
+        {'loop_gain': 0.0, 'loop_integral': 0.0}))
+    part = segments(recording())[0]
+    moving = {name: series.slice(6.0, part.end) for name, series in part.streams.items()}
+    seen = replay(plant, replace(part, start=6.0, streams=moving))
+    start = moving['wheels'].values[0]
+    np.testing.assert_allclose([seen.column('wheel_left')[0], seen.column('wheel_right')[0]],
+                               start, atol=0.1)
 
 
 def test_too_few_steps_are_refused() -> None:
