@@ -30,7 +30,8 @@ import click
               help="Model to start from; the Husky with the paper's parameters by default.")
 @click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE',
               help='Override a physical parameter; may be given several times.')
-@click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True)
+@click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
+              help='Seed of all chance: starts, genes, noise.')
 @click.option('--starts', type=click.IntRange(min=1), default=6, show_default=True,
               help='Starts of the least squares.')
 @click.option('--jobs', type=click.IntRange(min=1), default=1, show_default=True,

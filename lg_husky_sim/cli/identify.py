@@ -34,7 +34,8 @@ import click
 @click.option('--profile', multiple=True, metavar='NAMES',
               help='Parameters to give a likelihood profile, separated by commas: intervals '
                    'that hold for bent likelihoods too, at the price of more simulations.')
-@click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True)
+@click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
+              help='Seed of all chance: starts, genes, noise.')
 @click.option('--starts', type=click.IntRange(min=1), default=6, show_default=True,
               help='Starts of the least squares.')
 @click.option('--jobs', type=click.IntRange(min=1), default=1, show_default=True,

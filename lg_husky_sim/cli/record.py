@@ -14,7 +14,7 @@ import click
 @click.option('--preset', default='paper', show_default=True,
               help='Names and types of a robot: paper, husky_ros1 or clearpath_jazzy.')
 @click.option('--storage', type=click.Choice(['mcap', 'sqlite3']), default='mcap',
-              show_default=True)
+              show_default=True, help='Storage of the rosbag2.')
 @click.option('--seconds', type=click.FloatRange(min=0.0, min_open=True), metavar='SECONDS',
               help='End by itself after so long; by default Ctrl-C ends it.')
 def command(bag: Path, preset: str, storage: str, seconds: float | None) -> None:
