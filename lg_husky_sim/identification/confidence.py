@@ -191,13 +191,18 @@ def undetermined(result: Confidence, values: FloatArray) -> tuple[str, ...]:
         form = f'{first}/{second}' if sign > 0.0 else f'{first}·{second}'
         amount = (values[j] / values[i]) if sign > 0.0 else values[j] * values[i]
         said.append(
-            f'only {form} = {amount:.4g} is well determined (±{100 * reach * joint:.2g} %), '
-            f'{names[i]} and {names[j]} alone only to ±{100 * reach * relative[i]:.2g} % and '
-            f'±{100 * reach * relative[j]:.2g} % (correlation {correlation:+.3f}); '
+            f'only {form} = {amount:.4g} is well determined ({_width(reach * joint)}), '
+            f'{names[i]} and {names[j]} alone only to {_width(reach * relative[i])} and '
+            f'{_width(reach * relative[j])} (correlation {correlation:+.3f}); '
             f'{separators((names[i], names[j]))}')
     covered = ' '.join(said)
-    for name, spread in zip(names, relative, strict=True):
+    for place, (name, spread) in enumerate(zip(names, relative, strict=True)):
         if reach * spread > WIDE and name not in covered:
-            said.append(f'{name} is hardly determined by these data '
-                        f'(±{100 * reach * spread:.2g} %)')
+            said.append(f'{name} is hardly determined by these data: '
+                        f'{result.low[place]:.3g} to {result.high[place]:.3g}')
     return tuple(said)
+
+
+def _width(reach: float) -> str:
+    # Half the width of an interval of a logarithm.
+    return f'±{100 * reach:.2g} %' if reach < 1.0 else f'a factor of {np.exp(min(reach, 50)):.2g}'
