@@ -7,26 +7,29 @@ An effort that the graph lacks pushes into one of its balances: the torque balan
 the contact between wheels and ground, the force or the moment balance of the chassis. A sensor
 that is off adds to its channel alone. Each input is a Gaussian process in time (first-order
 Markov, straight between knots); its response in every channel follows from the linear part of
-the derived equations. The estimate is that of a Kalman smoother, computed as regularised least
-squares with a banded matrix, so that every channel keeps its own stamps and windows.
+the derived equations. Every channel keeps its own stamps and windows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
 import math
 
+from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model, Structure
-from lg_husky_sim.husky.parameters import Parameters
-from lg_husky_sim.identification.noise import LEAST, spread, STAMP
-from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.husky.parameters import Parameter, Parameters
+from lg_husky_sim.husky.plant import OUTPUTS
+from lg_husky_sim.identification.noise import LEAST, spread
+from lg_husky_sim.identification.problem import Observations, PERIOD
 from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.simulation.kernel import COLUMNS
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded, expm
+from scipy.linalg import expm
+from scipy.ndimage import maximum_filter1d
 from scipy.sparse import csc_matrix
 
 #: Time between knots of an input, and width of the bins of fast channels [s].
@@ -35,20 +38,49 @@ BIN = 0.1
 #: Step of the responses and longest memory that they have [s].
 STEP = 0.01
 MEMORY = 3.0
-#: Correlation times [s] and relative sizes of the processes that are tried.
-TIMES = (0.3, 3.0)
-SIZES = (0.1, 0.4, 1.6, 6.4, 25.0)
+#: What no input has to explain: late or early by this much [s], off by this share of the signal.
+JITTER = 0.012
+SHARE = 0.01
+#: Forces of an ordinary rough floor as a share of the weight, and what their correlation in time
+#: costs: neighbouring bins are no independent witnesses.
+ROUGHNESS = 0.01
+CORRELATED = 1.6
+#: Standard acceleration of free fall [m/s²].
+GRAVITY = 9.80665
 #: Row of the plant's outputs that a channel sees, and whether it is averaged over a window.
 _ROWS = {'wheel_left': 0, 'wheel_right': 1, 'yaw_rate': 3, 'advance': 2, 'turn': 3}
 _WINDOWED = ('advance', 'turn')
+_SIDES = ('left', 'right')
+#: Sizes by which factors are made comparable, by the first word of a column.
+_SCALES = {'voltage': 10.0, 'wheel': 4.0, 'forward': 0.6, 'yaw': 0.6, 'current': 5.0}
 _CARRIERS = (('rolling_resistance', 'none'), ('yaw_pull', 'none'),
              ('coulomb_drivetrain', 'both'), ('traction_saturation', 'none'))
 
 
 @dataclass(frozen=True)
+class Term:
+    """
+    Where a process acts, and what it is multiplied by.
+
+    Parameters
+    ----------
+    efforts : tuple of str
+        Modulated sources of the graph that it drives together; empty for a sensor.
+    channels : tuple of str
+        Channels that a sensor adds it to.
+    factor : str
+        One of :data:`FACTORS`.
+    """
+
+    efforts: tuple[str, ...] = ()
+    channels: tuple[str, ...] = ()
+    factor: str = 'one'
+
+
+@dataclass(frozen=True)
 class Input:
     """
-    One unknown input.
+    One unknown input: a process in time, and where it acts.
 
     Parameters
     ----------
@@ -56,28 +88,13 @@ class Input:
     unit : str
     size : float
         Typical size [unit]; the relative sizes that are tried refer to it.
-    channels : tuple of str
-        For a sensor, the channels that it adds to; empty for an effort.
-    efforts : tuple of str
-        For an effort, the modulated sources of the graph that carry it together.
+    terms : tuple of Term
     """
 
     name: str
     unit: str
     size: float
-    channels: tuple[str, ...] = ()
-    efforts: tuple[str, ...] = ()
-
-
-LEFT = Input('left drivetrain', 'N·m', 1.0, efforts=('T_coulomb_drivetrain_L',))
-RIGHT = Input('right drivetrain', 'N·m', 1.0, efforts=('T_coulomb_drivetrain_R',))
-SLIP_LEFT = Input('left contact', 'N·m', 1.0, efforts=('T_slip_FL', 'T_slip_RL'))
-SLIP_RIGHT = Input('right contact', 'N·m', 1.0, efforts=('T_slip_FR', 'T_slip_RR'))
-FORCE = Input('chassis force', 'N', 5.0, efforts=('F_rolling_resistance',))
-MOMENT = Input('yaw moment', 'N·m', 1.0, efforts=('F_yaw_pull',))
-GYRO = Input('gyro', 'rad/s', 0.02, channels=('yaw_rate',))
-ENCODER_LEFT = Input('left encoder', 'rad/s', 0.1, channels=('wheel_left',))
-ENCODER_RIGHT = Input('right encoder', 'rad/s', 0.1, channels=('wheel_right',))
+    terms: tuple[Term, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,48 +124,6 @@ class Bins:
     slopes: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """
-    Inputs over one piece.
-
-    Parameters
-    ----------
-    piece : int
-    times : numpy.ndarray, shape (n_knots,)
-        On the recording's clock [s].
-    values, deviations : numpy.ndarray, shape (n_knots, n_inputs)
-        Estimate and its standard deviation [unit of each input].
-    gains : numpy.ndarray, shape (n_rows,)
-        Drop of the half squared residual of each row of the bins [nats].
-    """
-
-    piece: int
-    times: FloatArray
-    values: FloatArray
-    deviations: FloatArray
-    gains: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """
-    What a family of inputs explains together.
-
-    Parameters
-    ----------
-    inputs : tuple of Input
-    evidence : float
-        Logarithm of the marginal likelihood against no input at all [nats].
-    estimates : tuple of Estimate
-        One for each piece.
-    """
-
-    inputs: tuple[Input, ...]
-    evidence: float
-    estimates: tuple[Estimate, ...]
-
-
 def effort_columns(structure: Structure, parameters: Parameters
                    ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
     """
@@ -171,7 +146,7 @@ def effort_columns(structure: Structure, parameters: Parameters
     bare = replace(structure, onset=None,
                    effects=tuple(replace(e, late=False) for e in structure.effects))
     have = {(e.id, e.side) for e in bare.effects}
-    extra = []
+    extra: list[Parameter] = []
     for name, side in _CARRIERS:
         effect = Effect(name) if side == 'none' else Effect(name, side)
         if (effect.id, effect.side) not in have:
@@ -188,23 +163,27 @@ def effort_columns(structure: Structure, parameters: Parameters
     return plant.a, plant.rows, {name: plant.g[:, i] for i, name in enumerate(names)}
 
 
-def binned(observations: Observations, residual: FloatArray, predicted: FloatArray
+def binned(observations: Observations, fit: Fit, floor: Mapping[str, float]
            ) -> tuple[Bins, ...]:
     """
-    Average residuals over short bins.
+    Average what a fit leaves over short bins.
 
     Parameters
     ----------
     observations : Observations
-    residual, predicted : numpy.ndarray, shape (n_values,)
-        Of a fit.
+    fit : Fit
+    floor : mapping of str to float
+        Deviation of each channel that an ordinary rough floor explains.
 
     Returns
     -------
     tuple of Bins
-        One for each piece. The noise is that of the differences between neighbours, and the
-        slope of the signal times the uncertainty of a stamp.
+        One for each piece. The noise is that of the differences between neighbours, the slope of
+        the signal near by times a small delay, a small share of the largest signal, and
+        what an ordinary floor does.
     """
+    predicted, jacobian = fit.solution.predicted, fit.solution.jacobian
+    residual = observations.measured - predicted
     level = {}
     for name in observations.channels:
         steps = np.concatenate([np.diff(residual[s.first:s.last]) for s in observations.slices
@@ -214,23 +193,25 @@ def binned(observations: Observations, residual: FloatArray, predicted: FloatArr
     for one in observations.slices:
         piece = observations.pieces[one.piece]
         channel = next(c for c in piece.channels if c.name == one.channel)
-        own, signal = residual[one.first:one.last], predicted[one.first:one.last]
-        cell = np.arange(own.size) if one.channel in _WINDOWED else np.floor(
-            (channel.times - piece.start) / BIN).astype(np.int64)
-        _, cell = np.unique(cell, return_inverse=True)
+        part = slice(one.first, one.last)
+        size = one.last - one.first
+        cell = np.arange(size) if one.channel in _WINDOWED else np.unique(np.floor(
+            (channel.times - piece.start) / BIN), return_inverse=True)[1]
         count = np.bincount(cell)
-        slope = np.abs(np.gradient(signal, channel.times + 1e-9 * np.arange(own.size)))
-        rows = np.column_stack([
-            np.bincount(cell, channel.begins) / count, np.bincount(cell, channel.times) / count,
-            np.bincount(cell, own) / count,
-            np.sqrt(level[one.channel] ** 2 / count
-                    + (STAMP * np.bincount(cell, slope) / count) ** 2)])
-        parts.setdefault(one.piece, []).append((one.channel, rows))
+        slope = np.abs(np.gradient(predicted[part], channel.times + 1e-9 * np.arange(size)))
+        averages = csc_matrix((1.0 / count[cell], (cell, np.arange(size)))) @ np.column_stack(
+            [channel.begins, channel.times, residual[part], slope, jacobian[part]])
+        near = maximum_filter1d(averages[:, 3], 3 if one.channel in _WINDOWED else 5)
+        averages[:, 3] = np.sqrt(level[one.channel] ** 2 / count + (JITTER * near) ** 2
+                                 + (SHARE * np.max(np.abs(predicted[part]))) ** 2
+                                 + floor[one.channel] ** 2)
+        parts.setdefault(one.piece, []).append((one.channel, averages))
     found = []
     for number, named in parts.items():
         table = np.vstack([rows for _, rows in named])
         names = tuple(name for name, rows in named for _ in range(len(rows)))
-        found.append(Bins(number, names, *table.T))
+        begins, ends, values, deviations = table[:, :4].T
+        found.append(Bins(number, names, begins, ends, values, deviations, table[:, 4:]))
     return tuple(found)
 
 
@@ -240,17 +221,20 @@ class Responses:
 
     Parameters
     ----------
-    structure, parameters
-        Of a fitted model.
+    observations : Observations
+    fit : Fit
     """
 
-    def __init__(self, structure: Structure, parameters: Parameters) -> None:
-        self._a, self._rows, self._columns = effort_columns(structure, parameters)
+    def __init__(self, observations: Observations, fit: Fit) -> None:
+        self._a, self._rows, self._columns = effort_columns(fit.structure, fit.parameters)
         self._kernels: dict[tuple[str, ...], FloatArray] = {}
+        self._pieces = observations.pieces
+        plant = compile_model(fit.structure).at(fit.parameters)
+        self._grids = observations.simulate(plant)
 
     def has(self, one: Input) -> bool:
         """Return whether the graph has all sources that carry an input."""
-        return all(name in self._columns for name in one.efforts)
+        return all(name in self._columns for term in one.terms for name in term.efforts)
 
     def _kernel(self, efforts: tuple[str, ...]) -> FloatArray:
         # Responses of all outputs to a pulse at 0, from -KNOT on, every STEP.
@@ -269,6 +253,93 @@ class Responses:
             self._kernels[efforts] = states @ self._rows.T
         return self._kernels[efforts]
 
+    def floor(self, parameters: Parameters) -> dict[str, float]:
+        """
+        Return the deviation of each channel on an ordinary rough floor.
+
+        Parameters
+        ----------
+        parameters : Parameters
+
+        Returns
+        -------
+        dict of str to float
+        """
+        force = ROUGHNESS * GRAVITY * parameters['mass']
+        pushes = {'F_rolling_resistance': force, 'F_yaw_pull': 0.25 * force * parameters['track']}
+        for side in 'LR':
+            pushes[f'T_coulomb_drivetrain_{side}'] = force * parameters['wheel_radius']
+        every = round(KNOT / STEP)
+        squares = np.zeros(len(OUTPUTS))
+        for name, push in pushes.items():
+            if name in self._columns:
+                squares += np.sum((push * self._kernel((name,))[::every]) ** 2, axis=0)
+        return {channel: CORRELATED * math.sqrt(squares[row]) for channel, row in _ROWS.items()}
+
+    def signal(self, piece: int, name: str, times: FloatArray) -> FloatArray:
+        """
+        Return a column of the fitted model's simulation.
+
+        Parameters
+        ----------
+        piece : int
+        name : str
+            A column of the simulator, or half the sum or difference of its voltages:
+            ``voltage_common``, ``voltage_difference``.
+        times : numpy.ndarray, shape (n,)
+            [s].
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
+        grid = self._grids[piece]
+        if name in ('voltage_common', 'voltage_difference'):
+            left, right = (grid[:, COLUMNS.index(f'voltage_{side}')] for side in _SIDES)
+            column = 0.5 * (right + (left if name == 'voltage_common' else -left))
+        else:
+            column = grid[:, COLUMNS.index(name)]
+        start = self._pieces[piece].start
+        return np.interp(times, start + PERIOD * np.arange(column.size), column)
+
+    def factor(self, piece: int, name: str, times: FloatArray) -> FloatArray:
+        """
+        Return what a process is multiplied by, about 1 in size.
+
+        Parameters
+        ----------
+        piece : int
+        name : str
+            ``one``; a signal, with its ``rate`` (change in time), its ``sign``
+            or its recent ``change`` behind a colon.
+        times : numpy.ndarray, shape (n,)
+            [s].
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
+        if name == 'one':
+            return np.ones(times.size)
+        if name.startswith('-'):
+            return -self.factor(piece, name[1:], times)
+        column, _, kind = name.partition(':')
+        value = self.signal(piece, column, times)
+        scale = _SCALES.get(column.split('_')[0], 1.0)
+        if kind == 'sign':
+            return np.tanh(value / (0.05 * scale))
+        if kind == 'change':
+            before = np.array([self.signal(piece, column, times + lag)
+                               for lag in np.arange(-1.0, 0.3, 0.1)])
+            change: FloatArray = np.ptp(before, axis=0) / scale
+            return change
+        if kind == 'rate':
+            ahead, behind = (self.signal(piece, column, times + lag) for lag in (0.05, -0.05))
+            rate: FloatArray = (ahead - behind) / (0.1 * scale)
+            return rate
+        scaled: FloatArray = value / scale
+        return scaled
+
     def design(self, bins: Bins, inputs: Sequence[Input], knots: FloatArray) -> csc_matrix:
         """
         Return the scaled response of every row to every knot.
@@ -286,35 +357,34 @@ class Responses:
             The inputs of one knot stand side by side.
         """
         names = np.array(bins.channels)
+        shape = (len(bins.channels), knots.size * len(inputs))
         rows, columns, values = [], [], []
         reach = math.ceil((MEMORY + 2.0 * KNOT) / KNOT)
-        for place, one in enumerate(inputs):
-            for channel in dict.fromkeys(bins.channels):
-                if one.channels and channel not in one.channels:
-                    continue
-                here = np.flatnonzero(names == channel)
-                last = np.floor((bins.ends[here] - knots[0]) / KNOT).astype(np.int64) + 1
-                knot = last[:, None] - np.arange(reach)[None, :]
-                inside = (knot >= 0) & (knot < knots.size)
-                at = knots[np.clip(knot, 0, knots.size - 1)]
-                late, early = (edge[here][:, None] - at for edge in (bins.ends, bins.begins))
-                value = np.where(inside, self._seen(one, channel, early, late), 0.0)
-                value /= bins.deviations[here][:, None]
-                used = np.abs(value) > 1e-6
-                rows.append(np.broadcast_to(here[:, None], knot.shape)[used])
-                columns.append((knot * len(inputs) + place)[used])
-                values.append(value[used])
-        shape = (len(bins.channels), knots.size * len(inputs))
-        if not rows:
-            return csc_matrix(shape)
+        for (place, one), channel in itertools.product(enumerate(inputs),
+                                                       dict.fromkeys(bins.channels)):
+            here = np.flatnonzero(names == channel)
+            last = np.floor((bins.ends[here] - knots[0]) / KNOT).astype(np.int64) + 1
+            knot = last[:, None] - np.arange(reach)[None, :]
+            near = np.clip(knot, 0, knots.size - 1)
+            late, early = (edge[here][:, None] - knots[near] for edge in (bins.ends, bins.begins))
+            value = np.zeros(knot.shape)
+            for term in one.terms:
+                if not term.channels or channel in term.channels:
+                    value += (self._seen(term, channel, early, late)
+                              * self.factor(bins.piece, term.factor, knots)[near])
+            value /= bins.deviations[here][:, None]
+            used = (np.abs(value) > 1e-6) & (knot == near)
+            rows.append(np.broadcast_to(here[:, None], knot.shape)[used])
+            columns.append((knot * len(inputs) + place)[used])
+            values.append(value[used])
         return csc_matrix((np.concatenate(values),
                            (np.concatenate(rows), np.concatenate(columns))), shape=shape)
 
-    def _seen(self, one: Input, channel: str, early: FloatArray, late: FloatArray) -> FloatArray:
-        if one.channels:
+    def _seen(self, term: Term, channel: str, early: FloatArray, late: FloatArray) -> FloatArray:
+        if term.channels:
             hat: FloatArray = np.maximum(0.0, 1.0 - np.abs(0.5 * (early + late)) / KNOT)
             return hat
-        kernel = self._kernel(one.efforts)[:, _ROWS[channel]]
+        kernel = self._kernel(term.efforts)[:, _ROWS[channel]]
         times = np.arange(kernel.size) * STEP - KNOT
         if channel not in _WINDOWED:
             return np.interp(late, times, kernel, left=0.0, right=0.0)
@@ -322,112 +392,3 @@ class Responses:
         way: FloatArray = ((np.interp(late, times, total) - np.interp(early, times, total))
                            / (late - early))
         return way
-
-
-def _prior(count: int, sizes: Sequence[float], time: float, width: int) -> FloatArray:
-    # Banded precision (lower form) of independent first-order Markov processes.
-    k = len(sizes)
-    share = math.exp(-KNOT / time)
-    band = np.zeros((width + 1, count * k))
-    for place, size in enumerate(sizes):
-        inner = 1.0 / (size ** 2 * (1.0 - share ** 2))
-        diagonal = np.full(count, inner * (1.0 + share ** 2))
-        diagonal[[0, -1]] = inner
-        band[0, place::k] = diagonal
-        band[k, place:(count - 1) * k:k] = -share * inner
-    return band
-
-
-def _banded(matrix: csc_matrix, width: int) -> FloatArray:
-    band = np.zeros((width + 1, matrix.shape[0]))
-    for offset in range(width + 1):
-        diagonal = matrix.diagonal(-offset)
-        band[offset, :diagonal.size] = diagonal
-    return band
-
-
-@dataclass(frozen=True, eq=False)
-class _System:
-    design: csc_matrix
-    band: FloatArray
-    along: FloatArray
-    knots: FloatArray
-    width: int
-
-    def posterior(self, sizes: Sequence[float], time: float) -> tuple[float, FloatArray]:
-        prior = _prior(self.knots.size, sizes, time, self.width)
-        factor = cholesky_banded(self.band + prior, lower=True)
-        own = cholesky_banded(prior, lower=True)
-        mean = cho_solve_banded((factor, True), self.along)
-        gain = 0.5 * float(self.along @ mean) - float(
-            np.sum(np.log(factor[0])) - np.sum(np.log(own[0])))
-        return gain, mean
-
-    def deviations(self, sizes: Sequence[float], time: float) -> FloatArray:
-        prior = _prior(self.knots.size, sizes, time, self.width)
-        factor = cholesky_banded(self.band + prior, lower=True)
-        inverse = cho_solve_banded((factor, True), np.eye(self.along.size))
-        spreads: FloatArray = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-        return spreads
-
-
-def explain(observations: Observations, bins: Sequence[Bins], responses: Responses,
-            inputs: Sequence[Input], spreads: bool = True,
-            progress: Callable[[], object] | None = None) -> Explanation:
-    """
-    Estimate a family of inputs, their sizes and correlation time chosen by the evidence.
-
-    Parameters
-    ----------
-    observations : Observations
-    bins : sequence of Bins
-        Of :func:`binned`.
-    responses : Responses
-    inputs : sequence of Input
-        All estimated together.
-    spreads : bool
-        Whether standard deviations are wanted; NaN without.
-    progress : callable, optional
-        Called after each piece.
-
-    Returns
-    -------
-    Explanation
-    """
-    k = len(inputs)
-    systems = []
-    for one in bins:
-        start, end = float(one.begins.min()), float(one.ends.max())
-        knots = start + KNOT * np.arange(max(3, math.ceil((end - start) / KNOT) + 2))
-        design = responses.design(one, inputs, knots)
-        square = (design.T @ design).tocsc()
-        entries = square.tocoo()
-        reach = int(np.max(np.abs(entries.row - entries.col), initial=0))
-        width = min(max(reach, k), knots.size * k - 1)
-        systems.append(_System(design, _banded(square, width),
-                               design.T @ (one.values / one.deviations), knots, width))
-        if progress is not None:
-            progress()
-    best: tuple[float, tuple[float, ...], float] = (0.0, (), TIMES[0])
-    for time, relative in itertools.product(TIMES, SIZES):
-        sizes = tuple(relative * one.size for one in inputs)
-        gain = sum(system.posterior(sizes, time)[0] for system in systems)
-        if gain > best[0] or not best[1]:
-            best = (gain, sizes, time)
-    evidence, sizes, time = best
-    estimates = []
-    for one, system in zip(bins, systems, strict=True):
-        mean = system.posterior(sizes, time)[1]
-        scaled = one.values / one.deviations
-        gains = 0.5 * (scaled ** 2 - (scaled - system.design @ mean) ** 2)
-        spread_of = system.deviations(sizes, time) if spreads else np.full(mean.size, np.nan)
-        estimates.append(Estimate(one.piece, system.knots, mean.reshape(-1, k),
-                                  spread_of.reshape(-1, k), gains))
-    return Explanation(tuple(inputs), max(evidence, 0.0), tuple(estimates))
-
-
-def families() -> Mapping[str, tuple[Input, ...]]:
-    """Return the families of inputs that are held against each other, by the part they sit in."""
-    return {'drive': (LEFT, RIGHT), 'traction': (SLIP_LEFT, SLIP_RIGHT),
-            'translation': (FORCE,), 'rotation': (MOMENT,), 'gyro': (GYRO,),
-            'encoders': (ENCODER_LEFT, ENCODER_RIGHT)}
