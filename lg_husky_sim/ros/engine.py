@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import math
+from typing import NamedTuple
 
 from lg_husky_sim.errors import LgHuskyError, SettingsError
 from lg_husky_sim.husky.model import compile_model
@@ -23,8 +24,7 @@ TIME = 6
 LARGEST = 1e6
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):
     """
     All that is published of one step.
 
@@ -231,7 +231,7 @@ class Engine:
         flat.setflags(write=False)
         self.state = replace(state, flat=flat)
         self.step_count = 0
-        self.reading = replace(self.reading, step=0, time=0.0)
+        self.reading = self.reading._replace(step=0, time=0.0)
 
     def configure(self, settings: Settings) -> None:
         """

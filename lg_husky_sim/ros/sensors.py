@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from lg_husky_sim.husky.plant import Plant, SensorModel
 from lg_husky_sim.ros.settings import Settings
@@ -15,8 +15,7 @@ import numpy as np
 _TURN = 6.283185307179586
 
 
-@dataclass(frozen=True)
-class Measured:
+class Measured(NamedTuple):
     """
     Readings of one step.
 
@@ -98,14 +97,15 @@ class Sensors:
         settings : Settings
         """
         model = sensor_model(plant, state)
-        yaw = state.twist.yaw
+        rate_left, rate_right, forward, yaw, _, _, ahead, *_ = state.row.tolist()
         turning = 0.0 if self._yaw is None else (yaw - self._yaw) / self._period
         self._yaw = yaw
-        ahead = state.acceleration - yaw * yaw * settings.imu_x - turning * settings.imu_y
-        left = state.twist.forward * yaw - yaw * yaw * settings.imu_y + turning * settings.imu_x
-        self._history.append((*state.wheel_rates, *state.wheel_angles, yaw, ahead, left))
-        rates = self._stale(model.delay_wheels)
-        inertial = self._stale(model.delay_imu)
+        ahead -= yaw * yaw * settings.imu_x + turning * settings.imu_y
+        left = forward * yaw - yaw * yaw * settings.imu_y + turning * settings.imu_x
+        now = (rate_left, rate_right, *state.wheel_angles, yaw, ahead, left)
+        self._history.append(now)
+        rates = self._stale(model.delay_wheels) if model.delay_wheels else now
+        inertial = self._stale(model.delay_imu) if model.delay_imu else now
         gyro = model.gyro_factor * inertial[4] + model.gyro_bias + settings.gyro_bias
         accel = [inertial[5] + settings.accel_bias, inertial[6], settings.gravity]
         heading = state.pose.heading
