@@ -116,6 +116,14 @@ def _onset_error(truth: Json, findings: Sequence[Json]) -> float:
     return best
 
 
+def _begins_later(said: Json) -> bool:
+    """Tell an onset from "all along": a change since the baseline may begin with the first."""
+    if said.get('kind', 'none') == 'time' and said.get('time_s') is not None:
+        return not (PurePath(str(said.get('recording'))).name == 'rec1'
+                    and float(said['time_s']) < 1.0)
+    return str(said.get('kind', 'none')) != 'none'
+
+
 def _shares(held_out: Sequence[Json]) -> dict[str, float | None]:
     result: dict[str, float | None] = {}
     for name in ('all', 'position_m'):
@@ -168,7 +176,7 @@ def judge(answer: Json, outcome: Json) -> Judgement:
     onset = answer['onset']
     error = _onset_error(onset, findings) if onset['kind'] != 'none' else None
     invented = onset['kind'] == 'none' and any(
-        (finding.get('onset') or {}).get('kind', 'none') != 'none' for finding in findings)
+        _begins_later(finding.get('onset') or {}) for finding in findings)
     return Judgement(
         case=str(answer['case']), kind=spec['kind'], world=spec['world'], drive=spec['drive'],
         effects=tuple(hidden),

@@ -104,6 +104,9 @@ def test_an_onset_where_there_is_none_is_noted() -> None:
     one = judge(answer('slope'), outcome('known', finding('slope', 'translation', onset=said)))
     assert one.onset_invented
     assert one.onset_error is None
+    start = {'kind': 'time', 'recording': 'rec1', 'time_s': 0.04}
+    one = judge(answer('slope'), outcome('known', finding('slope', 'translation', onset=start)))
+    assert not one.onset_invented
 
 
 def test_sides_count_where_one_side_is_hit() -> None:
