@@ -3,10 +3,8 @@
 """
 Recorded segments as one vector of measurements, and the model's prediction of it.
 
-Every channel keeps its own stamps. The pose enters as increments over a window, taken in the
-body's frame at mid-heading, so that errors do not accumulate; the simulated pose is set back to
-the measured one every few seconds, so that physics that depends on heading or place acts where
-the robot really was.
+The simulated pose is set back to the measured one every few seconds, so that physics that
+depends on heading or place acts where the robot really was.
 """
 
 from __future__ import annotations
@@ -14,92 +12,31 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-import math
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.plant import Plant, SensorModel
+from lg_husky_sim.identification.pieces import (
+    Channel,
+    CHANNELS,
+    PERIOD,
+    Piece,
+    piece_of,
+    SETTLE,
+    UNITS,
+)
 from lg_husky_sim.recording import Segment
-from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
+from lg_husky_sim.signals import FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation.kernel import COLUMNS, run
 from lg_husky_sim.simulation.simulator import hold, Simulator
 import numpy as np
 from numpy.typing import NDArray
 
-#: Grid of the simulation [s].
-PERIOD = 0.01
-#: Window of a pose increment [s].
-WINDOW = 0.2
+__all__ = ['CHANNELS', 'PERIOD', 'UNITS', 'Channel', 'Observations', 'Piece', 'Slice',
+           'late_mask', 'observations', 'piece_of', 'simulate_piece']
+
 #: Time between two resets of the simulated pose to the measured one [s].
 RESET = 4.0
-#: Data after the start of a moving segment that are not used [s]: its initial state is unknown.
-SETTLE = 0.6
-#: Highest rate that a channel is used at [1/s]; faster ones are thinned.
-FASTEST = 55.0
-#: Channels in the order of the measurement vector.
-CHANNELS = ('wheel_left', 'wheel_right', 'yaw_rate', 'advance', 'turn')
-UNITS = {'wheel_left': 'rad/s', 'wheel_right': 'rad/s', 'yaw_rate': 'rad/s',
-         'advance': 'm/s', 'turn': 'rad/s'}
 _COLUMN = {name: i for i, name in enumerate(COLUMNS)}
-
-
-@dataclass(frozen=True, eq=False)
-class Channel:
-    """
-    One channel of one segment.
-
-    Parameters
-    ----------
-    name : str
-        One of :data:`CHANNELS`.
-    times : numpy.ndarray, shape (n,)
-        Stamps [s] on the recording's clock; for increments, the ends of the windows.
-    values : numpy.ndarray, shape (n,)
-        Measured; increments are divided by their window [unit of :data:`UNITS`].
-    begins : numpy.ndarray, shape (n,)
-        For increments, the begins of the windows [s]; else equal to ``times``.
-    """
-
-    name: str
-    times: FloatArray
-    values: FloatArray
-    begins: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """
-    A segment, ready to be simulated.
-
-    Parameters
-    ----------
-    recording : str
-    index : int
-        Of the segment in its recording.
-    start : float
-        Time of the first grid point [s].
-    count : int
-        Steps of the grid.
-    commands : TimeSeries
-    channels : tuple of Channel
-    pose : TimeSeries or None
-        Measured, for the start and the resets.
-    twist : BodyTwist
-        First guess of the initial velocity.
-    wheel_rates : tuple of float
-    wheel_angles : tuple of float
-        Initial angles [rad]; zero where no positions were recorded.
-    """
-
-    recording: str
-    index: int
-    start: float
-    count: int
-    commands: TimeSeries
-    channels: tuple[Channel, ...]
-    pose: TimeSeries | None
-    twist: BodyTwist
-    wheel_rates: tuple[float, float]
-    wheel_angles: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -378,105 +315,6 @@ def _seen(channel: Channel, piece: Piece, grid: FloatArray, angle: FloatArray,
            - _sample(distance, start, channel.begins - late))
     chord: FloatArray = way * np.sinc(turn / (2.0 * np.pi)) / span
     return chord
-
-
-def _thinned(times: FloatArray) -> slice:
-    if times.size < 3:
-        return slice(None)
-    step = float(np.median(np.diff(times)))
-    return slice(None, None, max(1, math.ceil(1.0 / (step * FASTEST)))) if step > 0.0 else (
-        slice(None))
-
-
-def _increments(pose: TimeSeries, start: float) -> tuple[Channel, ...]:
-    times = pose.times
-    picked = [int(np.searchsorted(times, start, side='left'))]
-    while picked[-1] < times.size:
-        following = int(np.searchsorted(times, times[picked[-1]] + WINDOW * 0.98, side='left'))
-        if following >= times.size:
-            break
-        picked.append(following)
-    if len(picked) < 2:
-        return ()
-    at = np.array(picked)
-    here, there = at[:-1], at[1:]
-    near = times[there] - times[here] < 3.0 * WINDOW
-    here, there = here[near], there[near]
-    x, y, heading = (pose.column(n) for n in ('x', 'y', 'heading'))
-    middle = 0.5 * (heading[here] + heading[there])
-    span = times[there] - times[here]
-    advance = ((x[there] - x[here]) * np.cos(middle) + (y[there] - y[here]) * np.sin(middle))
-    return (Channel('advance', times[there], advance / span, times[here]),
-            Channel('turn', times[there], (heading[there] - heading[here]) / span, times[here]))
-
-
-def _initial(series: TimeSeries | None, names: tuple[str, ...], start: float
-             ) -> tuple[float, ...]:
-    if series is None or not len(series):
-        return tuple(0.0 for _ in names)
-    early = series.slice(start, start + 0.15)
-    values = early if len(early) else series
-    return tuple(float(np.median(values.column(n)[:8])) for n in names)
-
-
-def piece_of(segment: Segment) -> Piece | None:
-    """
-    Prepare a segment.
-
-    Parameters
-    ----------
-    segment : Segment
-
-    Returns
-    -------
-    Piece or None
-        None if it is too short or has no command or no measurement.
-    """
-    streams = segment.streams
-    if 'command' not in streams or segment.duration < 2.0 * SETTLE:
-        return None
-    start = segment.start
-    count = math.ceil((segment.end - start) / PERIOD)
-    wheels, imu, pose = (streams.get(n) for n in ('wheels', 'imu', 'pose'))
-    rates = _initial(wheels, ('left', 'right'), start)
-    yaw = _initial(imu, ('yaw_rate',), start)[0]
-    channels: list[Channel] = []
-    forward = 0.0
-    if pose is not None and len(pose) > 3:
-        increments = _increments(pose, start)
-        channels.extend(increments)
-        if increments and increments[0].values.size:
-            forward = float(increments[0].values[0])
-            yaw = yaw if imu is not None else float(increments[1].values[0])
-    still = abs(forward) < 0.05 and abs(yaw) < 0.05 and max(map(abs, rates)) < 0.3
-    begin = start if still else start + SETTLE
-    if wheels is not None:
-        part = _thinned(wheels.times)
-        channels = [*(Channel(f'wheel_{side}', wheels.times[part], wheels.column(side)[part],
-                              wheels.times[part]) for side in ('left', 'right')), *channels]
-    if imu is not None:
-        part = _thinned(imu.times)
-        channels.append(Channel('yaw_rate', imu.times[part], imu.column('yaw_rate')[part],
-                                imu.times[part]))
-    kept = tuple(_after(channel, begin) for channel in channels)
-    kept = tuple(sorted((c for c in kept if c.values.size > 3),
-                        key=lambda c: CHANNELS.index(c.name)))
-    if not kept:
-        return None
-    angles = streams.get('wheel_angles')
-    start_angles = (0.0, 0.0)
-    if angles is not None and len(angles):
-        start_angles = (float(np.interp(start, angles.times, angles.column('left'))),
-                        float(np.interp(start, angles.times, angles.column('right'))))
-    return Piece(segment.recording, segment.index, start, count, streams['command'], kept,
-                 pose if pose is not None and len(pose) > 3 else None,
-                 BodyTwist() if still else BodyTwist(forward, yaw),
-                 (0.0, 0.0) if still else (rates[0], rates[1]), start_angles)
-
-
-def _after(channel: Channel, begin: float) -> Channel:
-    use = (channel.begins >= begin) & np.isfinite(channel.values)
-    return Channel(channel.name, channel.times[use], channel.values[use], channel.begins[use])
 
 
 def observations(segments: Sequence[Segment]) -> Observations:
