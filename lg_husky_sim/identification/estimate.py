@@ -14,7 +14,7 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.confidence import Confidence, confidence, undetermined
 from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
-from lg_husky_sim.identification.multistart import best_solution, Ends, refine
+from lg_husky_sim.identification.multistart import best_solution, Ends, lingers, refine
 from lg_husky_sim.identification.problem import Observations, observations, UNITS
 from lg_husky_sim.identification.profile import Profile, profile
 from lg_husky_sim.identification.result import (
@@ -147,7 +147,8 @@ def _result(model: ModelFile, baseline: ModelFile, segments: Sequence[Segment], 
                 source=f'estimated from {", ".join(_recordings(segments))}')
         for one in of_model)), f'{model.about}; estimated by {method.value}'.lstrip('; '))
     values = np.array([one.value for one in estimates])
-    warnings = _warnings(solution, estimates, sure, ends, search, model)
+    warnings = (*_warnings(solution, estimates, sure, ends, search, model),
+                *_left_over(problem, solution))
     cost = solution.cost if search is None else search.cost
     converged = (solution.converged if search is None else search.converged)
     starts = () if ends is None else tuple(
@@ -243,6 +244,15 @@ def _warnings(solution: Solution, estimates: Sequence[Estimated], sure: Confiden
     if ends is not None and len(ends.all) > 1:
         said.extend(_disagreement(ends, sure))
     return tuple(said)
+
+
+def _left_over(problem: Problem, solution: Solution) -> list[str]:
+    data = problem.observations
+    scaled = (data.measured - solution.predicted) * problem.metric.scale
+    names = [name for name in data.channels if lingers(data, scaled, name)]
+    return [f'what is left in {", ".join(names)} lingers, as noise does not: physics is left out, '
+            'and the intervals hold for this model alone; lg_husky diagnose looks for it'
+            ] if names else []
 
 
 def _disagreement(ends: Ends, sure: Confidence) -> list[str]:

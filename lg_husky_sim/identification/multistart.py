@@ -172,12 +172,23 @@ def noise_metric(data: Observations, residual: FloatArray, predicted: FloatArray
     scale = scale * np.sqrt(weight)
     plain = metric(data, residual, scale, order=0)
     white = metric(data, residual, scale)
-    filters = {name: plain.filters[name] if _lingers(data, residual * scale, name)
+    filters = {name: plain.filters[name] if lingers(data, residual * scale, name)
                else white.filters[name] for name in data.channels}
     return Metric(scale, filters)
 
 
-def _lingers(data: Observations, scaled: FloatArray, name: str) -> bool:
+def lingers(data: Observations, scaled: FloatArray, name: str) -> bool:
+    """
+    Return whether a channel's residual stays on one side longer than noise does.
+
+    Parameters
+    ----------
+    data : Observations
+    scaled : numpy.ndarray, shape (n_values,)
+        Residual times the metric's scale.
+    name : str
+        Channel.
+    """
     above, below = 0.0, 0.0
     for one in data.slices:
         if one.channel == name:

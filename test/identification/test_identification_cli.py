@@ -82,11 +82,15 @@ def test_dask_gives_the_same_results(bag: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip('distributed')
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False,
                                   dashboard_address=None) as cluster:
+        address = ['--scheduler', cluster.scheduler_address]
         there, here = tmp_path / 'there.yaml', tmp_path / 'here.yaml'
-        assert run(['identify', str(bag), '--out', str(there), '--starts', '2', '--scheduler',
-                    cluster.scheduler_address]) == 0
+        assert run(['identify', str(bag), '--out', str(there), '--starts', '2', *address]) == 0
+        assert run(['identify', str(bag), '--out', str(tmp_path / 'each'), '--each', '--starts',
+                    '2', *address]) == 0
     assert run(['identify', str(bag), '--out', str(here), '--starts', '2']) == 0
-    assert dict(load_model(there).parameters) == dict(load_model(here).parameters)
+    local = dict(load_model(here).parameters)
+    assert dict(load_model(there).parameters) == local
+    assert dict(load_model(tmp_path / 'each' / f'{bag.name}.yaml').parameters) == local
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(

@@ -141,6 +141,15 @@ def test_a_bound_that_was_hit_is_warned_of(husky: ModelFile, circle: Segment) ->
                for w in result.warnings)
 
 
+def test_physics_that_is_left_out_is_warned_of(husky: ModelFile, make_drive: Drive,
+                                               truth: Truth, fit: FitResult) -> None:
+    segment = make_drive('spin', {**truth, 'yaw_coulomb_moment': 6.0}, structure=Structure(
+        effects=(Effect('yaw_scrub_coulomb'),)))
+    poor = estimate(husky, [segment], starts=1)
+    assert any('lingers' in w and 'wheel_left' in w for w in poor.warnings)
+    assert not any('lingers' in w for w in fit.warnings)
+
+
 def test_what_cannot_be_estimated_is_refused(husky: ModelFile, circle: Segment) -> None:
     fixed = ModelFile(husky.structure, husky.parameters.with_entries(*(
         replace(p, free=False) for p in husky.parameters.entries)))
