@@ -76,8 +76,8 @@ setup(
         *(f'{package_name}.{folder}' for folder in DATA_FOLDERS),
     ],
     package_dir={f'{package_name}.{folder}': folder for folder in DATA_FOLDERS},
-    package_data={'': ['py.typed', '*.yaml', '*.urdf', '*.rviz', '*.xml', '*.json', '*.j2', '*.html',
-                       '*.css', '*.js', '*.svg']},
+    package_data={'': ['py.typed', '*.yaml', '*.urdf', '*.rviz', '*.xml', '*.json', '*.j2',
+                       '*.html', '*.css', '*.js', '*.svg']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

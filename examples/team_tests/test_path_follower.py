@@ -52,6 +52,7 @@ def test_noise_does_not_throw_it_off(husky: Callable[..., LockStepHusky], yaw_no
     def drive() -> list[float]:
         robot = husky(preset='husky_ros1', sensor_noise=True, seed=4,
                       orientation_stddev=max(yaw_noise, 1e-6))
+
         def by_imu(now: Any) -> Any:
             return FOLLOWER.command(Pose(now.pose.x, now.pose.y, now.measured.heading))
         return robot.drive(by_imu, TURN).values[-1].tolist()
