@@ -146,7 +146,7 @@ def test_physics_that_is_left_out_is_warned_of(husky: ModelFile, make_drive: Dri
     segment = make_drive('spin', {**truth, 'yaw_coulomb_moment': 6.0}, structure=Structure(
         effects=(Effect('yaw_scrub_coulomb'),)))
     poor = estimate(husky, [segment], starts=1)
-    assert any('lingers' in w and 'wheel_left' in w for w in poor.warnings)
+    assert any('lingers' in w and 'yaw_rate, turn' in w for w in poor.warnings)
     assert not any('lingers' in w for w in fit.warnings)
 
 
