@@ -29,7 +29,9 @@ SUBSYSTEMS = ('command', 'electrical', 'drivetrain', 'traction', 'translation', 
 CELL = 0.5
 #: Longest data that are looked at [s]; beyond, the pieces that the fit explains worst.
 LONGEST = 400.0
-#: Range of quantities over which an effort is described, and the number of its bins.
+#: Evidence that healthy recordings do not reach [nats].
+CERTAIN = 20.0
+#: Bins of a quantity that an effort is held against.
 COUNT = 15
 
 
@@ -87,6 +89,24 @@ class Located:
         return max(known, key=self.score, default=-1)
 
     @property
+    def certain(self) -> bool:
+        """Whether the best family explains more than what healthy recordings leave."""
+        top = self.best()
+        return top >= 0 and self.explanations[top].evidence > CERTAIN
+
+    def gains(self) -> dict[tuple[str, int, str], float]:
+        """Return what the best family explains [nats] by recording, segment and channel."""
+        top = self.best()
+        found: dict[tuple[str, int, str], float] = {}
+        if top >= 0:
+            for bins, estimate in zip(self.bins, self.explanations[top].estimates, strict=True):
+                piece = self.observations.pieces[bins.piece]
+                for channel, gain in zip(bins.channels, estimate.gains, strict=True):
+                    key = (piece.recording, piece.index, channel)
+                    found[key] = found.get(key, 0.0) + float(gain)
+        return found
+
+    @property
     def strengths(self) -> dict[str, float]:
         """Evidence of each part relative to the strongest, 0 to 1, strongest first."""
         found = {name: max((self.score(i) for i, f in enumerate(self.families)
@@ -138,9 +158,9 @@ def families() -> tuple[Family, ...]:
                    Term(left, (), '-voltage_difference'),
                    Term(right, (), 'voltage_difference'))), 0.985),
         Family('torque with the voltage of both sides', 'electrical',
-               shared('torque per 10 V', 'voltage')),
+               shared('torque on each side', 'voltage')),
         Family('torque with the current of both sides', 'electrical',
-               shared('torque per 5 A', 'current')),
+               shared('torque on each side', 'current')),
         Family('torque on both drivetrains', 'drivetrain', sides('N·m', 1.0, ''), GENERAL),
         Family('torque against the rotation of the wheels', 'drivetrain',
                sides('N·m', 1.0, 'wheel', ':sign'), GENERAL),
@@ -152,27 +172,27 @@ def families() -> tuple[Family, ...]:
         Family('force on the chassis', 'translation',
                (_input('chassis force', 'N', 5.0, Term(force)),)),
         Family('force with the acceleration', 'translation',
-               (_input('force per acceleration', 'N', 5.0, Term(force, (), 'forward:rate')),)),
+               (_input('chassis force', 'N', 5.0, Term(force, (), 'forward:rate')),)),
         Family('moment on the chassis', 'rotation',
                (_input('yaw moment', 'N·m', 1.0, Term(moment)),)),
         Family('moment with the yaw rate', 'rotation',
-               (_input('moment per 0.6 rad/s', 'N·m', 1.0, Term(moment, (), 'yaw_rate')),)),
+               (_input('yaw moment', 'N·m', 1.0, Term(moment, (), 'yaw_rate')),)),
         Family('error of the gyro', 'sensor',
-               sensor('gyro', 'rad/s', 0.02, ('yaw_rate', 'one'))),
+               sensor('gyro error', 'rad/s', 0.02, ('yaw_rate', 'one'))),
         Family('factor of the gyro', 'sensor',
-               sensor('gyro per 0.6 rad/s', 'rad/s', 0.1, ('yaw_rate', 'yaw_rate'))),
+               sensor('gyro error', 'rad/s', 0.1, ('yaw_rate', 'yaw_rate'))),
         Family('factor of the left encoder', 'sensor',
-               sensor('left encoder per 4 rad/s', 'rad/s', 0.1, ('wheel_left', 'wheel_left'))),
+               sensor('left encoder error', 'rad/s', 0.1, ('wheel_left', 'wheel_left'))),
         Family('factor of the right encoder', 'sensor',
-               sensor('right encoder per 4 rad/s', 'rad/s', 0.1,
+               sensor('right encoder error', 'rad/s', 0.1,
                       ('wheel_right', 'wheel_right'))),
         Family('late stamps of the wheels', 'sensor',
-               sensor('wheels per slope', 'rad/s', 0.1, ('wheel_left', 'wheel_left:rate'),
+               sensor('wheel rate error', 'rad/s', 0.1, ('wheel_left', 'wheel_left:rate'),
                       ('wheel_right', 'wheel_right:rate'))),
         Family('late stamps of the gyro', 'sensor',
-               sensor('gyro per slope', 'rad/s', 0.02, ('yaw_rate', 'yaw_rate:rate'))),
+               sensor('gyro error', 'rad/s', 0.02, ('yaw_rate', 'yaw_rate:rate'))),
         Family('late stamps of the pose', 'sensor',
-               sensor('pose per slope', 'm/s', 0.02, ('advance', 'forward:rate'),
+               sensor('pose rate error', 'm/s', 0.02, ('advance', 'forward:rate'),
                       ('turn', 'yaw_rate:rate'))),
     )
 
@@ -338,7 +358,9 @@ def fingerprints(located: Located) -> tuple[Fingerprint, ...]:
     explanation = located.explanations[best]
     found = []
     for place, one in enumerate(explanation.inputs):
-        effort = np.concatenate([e.values[:, place] for e in explanation.estimates])
+        effort = np.concatenate([
+            e.values[:, place] * located.responses.factor(bins.piece, one.terms[0].factor, e.times)
+            for bins, e in zip(located.bins, explanation.estimates, strict=True)])
         times = np.concatenate([e.times for e in explanation.estimates])
         even = np.floor(times / 2.0).astype(np.int64) % 2 == 0
         tries = []

@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Write what a diagnosis found: JSON, model files, text."""
+"""Write what a diagnosis found: JSON, model files, text, report."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 
 from lg_husky_sim.diagnosis.diagnose import Case
+from lg_husky_sim.diagnosis.report import write_report
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Verdict
 from lg_husky_sim.husky.model_file import save_model
 
@@ -79,8 +80,14 @@ def write_files(folder: Path, case: Case) -> None:
     folder : pathlib.Path
         An empty folder.
     case : Case
+
+    Raises
+    ------
+    MissingExtraError
+        If the report cannot be made.
     """
     diagnosis = case.diagnosis
+    write_report(folder, case, headline(diagnosis))
     save_model(diagnosis.model, folder / 'model.yaml')
     save_model(diagnosis.plain_model, folder / 'plain.yaml')
     (folder / 'diagnosis.txt').write_text(summary_text(diagnosis) + '\n', encoding='utf-8')
