@@ -21,8 +21,17 @@ if TYPE_CHECKING:
 NAME = 'sim_node'
 
 
+class Interrupted(BaseException):
+    """
+    A signal asks the node to end while it starts.
+
+    Not KeyboardInterrupt: where that passes through an ``exec`` of text, as many imports do one,
+    CPython ends the process by SIGINT although the exception is caught.
+    """
+
+
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
+    raise Interrupted
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -40,10 +49,11 @@ def main(args: Sequence[str] | None = None) -> int:
         0 after a clean end, 1 if arguments, parameters or files are wrong.
     """
     # Imports take most of the start; a signal during them ends the process cleanly as well.
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     try:
         return _run(args)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Interrupted):
         return 0
 
 
@@ -65,13 +75,14 @@ def _run(args: Sequence[str] | None) -> int:
         # which would make steps late.
         gc.freeze()
         api.spin(node)
-    except (KeyboardInterrupt, api.ExternalShutdownException):
+    except (KeyboardInterrupt, Interrupted, api.ExternalShutdownException):
         code = 0
     except api.USER_ERRORS as error:
         print(f'error: {" ".join(str(error).split())}', file=sys.stderr)
         code = 1
     finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
         if node is not None:
             node.destroy_node()
         api.try_shutdown()
