@@ -1,0 +1,125 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`lg_husky plan-drive`: which drive tells two explanations apart?"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from lg_husky_sim.diagnosis.planning import Rival
+    from lg_husky_sim.manoeuvres import Manoeuvre
+
+
+@click.command(short_help='Find the drive that tells two explanations apart.')
+@click.argument('folder', required=False, type=click.Path(path_type=Path), metavar='[DIR]')
+@click.option('--effects', metavar='A,B',
+              help='Two ids of the catalogue, at typical sizes, instead of a diagnosis; '
+                   'with a side if need be (coulomb_drivetrain:left).')
+@click.option('--robot', '--model', 'robot', type=click.Path(path_type=Path),
+              metavar='FILE.yaml',
+              help="Model that --effects are added to; the Husky with the paper's parameters by "
+                   'default.')
+@click.option('--out', required=True, type=click.Path(path_type=Path), metavar='SCRIPT.yaml',
+              help='Command script of the best drive, for simulate and drive.')
+@click.option('--max-speed', default=0.8, show_default=True, metavar='M/S',
+              type=click.FloatRange(0.1, 3.0), help='Highest speed of a drive.')
+@click.option('--max-yaw', default=0.8, show_default=True, metavar='RAD/S',
+              type=click.FloatRange(0.1, 3.0), help='Highest yaw rate of a drive.')
+def command(folder: Path | None, effects: str | None, robot: Path | None, out: Path,
+            max_speed: float, max_yaw: float) -> None:
+    """
+    Say which drive tells the first two explanations of a diagnosis apart, and write it.
+
+    DIR is the folder of a diagnosis. Each explanation is simulated on a list of drives and
+    the other one refitted to it; the drive on which neither can imitate the other wins.
+    """
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    from lg_husky_sim.diagnosis.planning import DECISIVE, drives, plan
+    from lg_husky_sim.errors import SettingsError
+    from tqdm import tqdm
+
+    if (folder is None) == (effects is None):
+        raise SettingsError('give either the folder of a diagnosis or --effects A,B')
+    if out.is_dir() or not out.resolve().parent.is_dir():
+        raise SettingsError(f'cannot write {out}: it must be a file in an existing folder')
+    one, two = _from_folder(folder) if folder is not None else _from_ids(effects or '', robot)
+    candidates = drives(max_speed, max_yaw)
+    with tqdm(total=len(candidates), desc='drives', disable=None, leave=False) as bar:
+        ranked = plan(one, two, candidates, bar.update)
+    click.echo(f'{one.name} against {two.name}: evidence that one recording of the drive would '
+               'give, whichever is true')
+    click.echo(f'{"drive":18} {"length":>7} {"evidence":>10}  says most')
+    for row in ranked:
+        click.echo(f'{row.manoeuvre.name:18} {row.manoeuvre.duration:5.0f} s '
+                   f'{row.nats:8.1f} nats  {row.channel}')
+    best = ranked[0]
+    _write(out, best.manoeuvre, f'{best.manoeuvre.about}; tells {one.name} and {two.name} apart '
+                                f'by {best.nats:.0f} nats')
+    click.echo(f'{out}: {best.manoeuvre.name}, {best.manoeuvre.about}')
+    if best.nats < DECISIVE:
+        click.echo('None of these drives decides: another sensor is needed, or more speed.')
+
+
+def _from_ids(text: str, robot: Path | None) -> tuple[Rival, Rival]:
+    from lg_husky_sim.diagnosis.planning import typical
+    from lg_husky_sim.errors import SettingsError
+    from lg_husky_sim.husky.model_file import load_model
+    names = [part.strip() for part in text.split(',')]
+    if len(names) != 2 or not all(names) or names[0] == names[1]:
+        raise SettingsError(f'--effects {text!r}: expected two different ids, such as '
+                            'yaw_scrub_coulomb,terrain_change')
+    model = load_model(robot)
+    one, two = (typical(name, model.structure, model.parameters, side)
+                for name, _, side in (part.partition(':') for part in names))
+    return one, two
+
+
+def _from_folder(folder: Path) -> tuple[Rival, Rival]:
+    import json
+
+    from lg_husky_sim.diagnosis.planning import Rival, typical
+    from lg_husky_sim.errors import SettingsError
+    from lg_husky_sim.husky.model_file import load_model
+    place = folder / 'diagnosis.json'
+    if not place.is_file():
+        raise SettingsError(f'{folder} is no folder of a diagnosis: it holds no diagnosis.json')
+    try:
+        data = json.loads(place.read_text(encoding='utf-8'))
+        finding = data['findings'][0] if data['findings'] else None
+        rivals = [(str(r['effect']), str(r['side'])) for r in finding['rivals']] if finding else []
+        name = str(finding['effect']) if finding else ''
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise SettingsError(f'{place} is no diagnosis: {error}') from error
+    rivals = [(effect, side) for effect, side in rivals if effect != name]
+    if not finding or name == 'unknown' or not rivals:
+        raise SettingsError(
+            f'{place} names no effect with a rival; there is nothing to tell apart')
+    plain, model = load_model(folder / 'plain.yaml'), load_model(folder / 'model.yaml')
+    kept = {e.id for e in plain.structure.effects}
+    first = next(e for e in model.structure.effects if e.id == name and e.id not in kept)
+    found = typical(name, plain.structure, model.parameters, first.side)
+    numbers = {p.name: model.parameters[p.name] for p in first.parameters()}
+    one = Rival(name, found.structure, found.parameters.replacing(numbers), (numbers,))
+    effect, side = rivals[0]
+    return one, typical(effect, plain.structure, plain.parameters,
+                        '' if side == 'none' else side)
+
+
+def _write(out: Path, manoeuvre: Manoeuvre, about: str) -> None:
+    import tempfile
+
+    from lg_husky_sim.manoeuvres import SCHEMA
+    import yaml
+    data = {'schema': SCHEMA, 'about': about, 'rate': manoeuvre.rate, 'steps': [
+        {'duration': round(s.duration, 3), 'forward': round(s.forward, 4),
+         'yaw': round(s.yaw, 4), 'ramp': round(s.ramp, 3)} for s in manoeuvre.steps]}
+    with tempfile.TemporaryDirectory(dir=out.resolve().parent, prefix='.plan.') as scratch:
+        draft = Path(scratch) / 'script.yaml'
+        draft.write_text(yaml.safe_dump(data, sort_keys=False, allow_unicode=True,
+                                        default_flow_style=None), encoding='utf-8')
+        os.replace(draft, out)
