@@ -49,8 +49,8 @@ def recording(task: Task) -> tuple[dict[str, float], Recording]:
              for name, (low, high) in TRUTH.items()}
     model = load_model()
     commands = find_manoeuvre('circle').commands()
-    path = rollout(compile_model(model.structure).at(model.parameters.replacing(truth)), commands,
-                   float(commands.times[-1]), 0.02)
+    plant = compile_model(model.structure).at(model.parameters.replacing(truth))
+    path = plant.observe(rollout(plant, commands, float(commands.times[-1]), 0.02))
     sensors = engine_config()['sensors']
     seen = sensed('circle', commands, path, draws, sensors)
     if not task.correlated:

@@ -53,8 +53,8 @@ def circle(seed: int = 0, truth: dict[str, float] | None = None) -> Segment:
     model = load_model()
     values = truth or {'wheel_damping': 2.4, 'yaw_damping': 19.0, 'command_gain': 0.872}
     commands = find_manoeuvre('circle').commands()
-    path = rollout(compile_model(model.structure).at(model.parameters.replacing(values)),
-                   commands, float(commands.times[-1]), 0.02)
+    plant = compile_model(model.structure).at(model.parameters.replacing(values))
+    path = plant.observe(rollout(plant, commands, float(commands.times[-1]), 0.02))
     config = engine_config()['sensors']
     return segments(sensed('circle', commands, path, np.random.default_rng(seed), config))[0]
 

@@ -63,7 +63,7 @@ def synthetic_case(seed: int) -> Case:
     for name in MANOEUVRES:
         commands = find_manoeuvre(name).commands()
         period = 1.0 / float(config['sensors']['rate'])
-        truth = rollout(plant, commands, float(commands.times[-1]), period)
+        truth = plant.observe(rollout(plant, commands, float(commands.times[-1]), period))
         recordings[name] = sensed(name, commands, truth, draws, config['sensors'])
     # The engine stands beside it where it is installed; nothing else here needs it.
     rivals = _nominal_runs() if find_spec('mujoco') is not None else {}

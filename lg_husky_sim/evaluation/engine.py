@@ -184,8 +184,8 @@ def drive(robot: EngineRobot, commands: TimeSeries, rate: float = 50.0) -> TimeS
     Returns
     -------
     TimeSeries
-        wheel_left, wheel_right [rad/s], forward [m/s], yaw_rate [rad/s], accel_x [m/s²],
-        x, y [m], heading [rad].
+        wheel_left, wheel_right [rad/s] as means over a sample, forward [m/s], yaw_rate
+        [rad/s], accel_x [m/s²], x, y [m], heading [rad].
 
     Raises
     ------
@@ -223,6 +223,9 @@ def drive(robot: EngineRobot, commands: TimeSeries, rate: float = 50.0) -> TimeS
             rows.append(row)
     values = np.array(rows)
     interval = every * robot.timestep
+    # An encoder counts: its rate is the mean since the sample before.
+    values[1:, :2] = np.diff(values[:, :2], axis=0) / interval
+    values[0, :2] = 0.0
     acceleration: FloatArray = np.gradient(values[:, 2], interval)
     times: FloatArray = start + interval * np.arange(len(values), dtype=np.float64)
     return TimeSeries(
@@ -241,8 +244,9 @@ def _references(robot: EngineRobot, commands: TimeSeries, start: float, count: i
 
 
 def _row(data: Any, turns: float) -> list[float]:
+    # Wheel angles, speed, yaw rate, position and heading.
     w, x, y, z = data.qpos[3:7]
     heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)) + turns
     forward = math.cos(heading) * data.qvel[0] + math.sin(heading) * data.qvel[1]
-    return [0.5 * (data.qvel[6] + data.qvel[7]), 0.5 * (data.qvel[8] + data.qvel[9]), forward,
+    return [0.5 * (data.qpos[7] + data.qpos[8]), 0.5 * (data.qpos[9] + data.qpos[10]), forward,
             data.qvel[5], data.qpos[0], data.qpos[1], heading]

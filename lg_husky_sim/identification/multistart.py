@@ -27,6 +27,8 @@ PASSES = 2
 #: Correlation from one value to the next above which a residual is taken for a misfit of the
 #: model, which is not whitened away; below it, for noise of a sensor, which is.
 MISFIT = 0.3
+#: Mean square of a standardised residual below which there is nothing left to explain.
+NOTHING = 0.1
 #: Standardised residual from which a value loses weight (Huber's loss).
 OUTLIER = 4.0
 
@@ -189,13 +191,15 @@ def lingers(data: Observations, scaled: FloatArray, name: str) -> bool:
     name : str
         Channel.
     """
-    above, below = 0.0, 0.0
+    above, below, count = 0.0, 0.0, 0
     for one in data.slices:
         if one.channel == name:
             part = scaled[one.first:one.last]
             above += float(part[1:] @ part[:-1])
             below += float(part @ part)
-    return above > MISFIT * below
+            count += part.size
+    # What is far below the least noise that is believed is rounding, whatever its shape.
+    return above > MISFIT * below and below > NOTHING * count
 
 
 def refine(data: Observations, model: ModelFile, unknowns: Sequence[Unknown],

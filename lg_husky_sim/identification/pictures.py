@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from lg_husky_sim.comparison.figures import STYLE
+from lg_husky_sim.identification.profile import LEVEL, Profile
 from lg_husky_sim.identification.result import Estimated, FitResult
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -87,6 +88,35 @@ def certainty_figure(result: FitResult) -> Figure:
         right.set_yticks(range(count), names)
         right.set_title('Correlation')
         figure.colorbar(image, ax=right, fraction=0.046, pad=0.04)
+    return figure
+
+
+def profile_figure(profiles: Sequence[Profile]) -> Figure:
+    """
+    Draw likelihood profiles with their 95 % level.
+
+    Parameters
+    ----------
+    profiles : sequence of Profile
+        At least one.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(STYLE):
+        figure = Figure(figsize=(3.6 * len(profiles), 3.2), layout='constrained')
+        for axes, one in zip(np.atleast_1d(figure.subplots(1, len(profiles))), profiles,
+                             strict=True):
+            axes.plot(one.values, one.rise, '.-', color=BEST)
+            axes.axhline(LEVEL, color=MEAN, linestyle='--', linewidth=1.0, label='95 %')
+            axes.set_xlabel(one.name)
+            axes.set_ylabel('rise of the cost [nats]')
+            axes.set_ylim(0.0, 4.0 * LEVEL)
+            axes.legend()
     return figure
 
 

@@ -13,6 +13,8 @@ from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy import stats
 
+#: Rise of the cost at the ends of a 95 % interval [nats].
+LEVEL = 0.5 * float(stats.chi2.ppf(0.95, 1))
 #: Values of the held parameter on either side of the estimate.
 SIDE = 5
 #: Farthest value, in standard deviations.
@@ -96,10 +98,9 @@ def profile(problem: Problem, solution: Solution, name: str, deviation: float,
     order = np.argsort(values)
     at, cost = np.array(values)[order], np.array(costs)[order]
     rise = (cost - np.min(cost)) / inflation
-    level = 0.5 * float(stats.chi2.ppf(0.95, 1))
     best = int(np.argmin(rise))
-    return Profile(name, at, rise, _crossing(at[best::-1], rise[best::-1], level, -np.inf),
-                   _crossing(at[best:], rise[best:], level, np.inf))
+    return Profile(name, at, rise, _crossing(at[best::-1], rise[best::-1], LEVEL, -np.inf),
+                   _crossing(at[best:], rise[best:], LEVEL, np.inf))
 
 
 def _crossing(values: FloatArray, rise: FloatArray, level: float, none: float) -> float:

@@ -22,7 +22,11 @@ from lg_husky_sim.identification.pages import (
     Section,
     Table,
 )
-from lg_husky_sim.identification.pictures import certainty_figure, convergence_figure
+from lg_husky_sim.identification.pictures import (
+    certainty_figure,
+    convergence_figure,
+    profile_figure,
+)
 from lg_husky_sim.identification.result import FitResult
 from lg_husky_sim.recording import Segment
 
@@ -126,6 +130,8 @@ def fit_pictures(result: FitResult, segments: Sequence[Segment], before: ModelFi
                                 f'{title}: trajectory and tracking error'))
     made.append(picture(certainty_figure(result),
                         'Intervals of the estimates and their correlation'))
+    if result.profiles:
+        made.append(picture(profile_figure(result.profiles), 'Likelihood profiles'))
     if len(result.history):
         made.append(picture(convergence_figure(result.history),
                             "Convergence of the search (the paper's Fig. 12)"))
@@ -147,12 +153,13 @@ def _sections(result: FitResult, pictures: Sequence[Picture]) -> list[Section]:
         ('root mean square of measured − simulated', 'before', 'fitted', 'unit', 'values'),
         [(c.name, f'{c.before:.4g}', f'{c.after:.4g}', c.unit, str(c.count))
          for c in result.channels])
-    sections = [Section('Agreement', tables=[channels], pictures=pictures[:-1] if not len(
-        result.history) else pictures[:-2])]
+    # Those of the parameters come last: certainty, then profiles and convergence if there are.
+    last = len(pictures) - 1 - bool(result.profiles) - bool(len(result.history))
+    sections = [Section('Agreement', tables=[channels], pictures=pictures[:last])]
     if result.warnings:
         sections.append(Section('Warnings', points=result.warnings, warning=True))
     sections.append(Section(
         'Parameters', tables=[estimates], points=result.undetermined,
-        pictures=pictures[-1:] if not len(result.history) else pictures[-2:]))
+        pictures=pictures[last:]))
     sections.append(Section('As text', verbatim=str(result)))
     return sections

@@ -39,7 +39,7 @@ def recording(effects: tuple[str, ...] = (), steps: int = 10, **values: float) -
     times = 0.05 * np.arange(80 * steps + 1, dtype=np.float64)
     commands = TimeSeries(times, targets[np.minimum((times / 4.0).astype(int), steps - 1)],
                           ('forward', 'yaw'))
-    seen = rollout(plant, commands, float(times[-1]), 0.01)
+    seen = plant.observe(rollout(plant, commands, float(times[-1]), 0.01))
 
     def stream(names: tuple[str, ...], every: int, noise: float) -> FloatArray:
         chosen: FloatArray = np.column_stack([seen.column(n) for n in names])[::every]
