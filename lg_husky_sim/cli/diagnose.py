@@ -40,8 +40,8 @@ def command(
     that were not fitted.
     """
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    from lg_husky_sim.diagnosis.output import MARKER, summary_text, write_files
     from lg_husky_sim.diagnosis.diagnose import diagnose
+    from lg_husky_sim.diagnosis.output import MARKER, summary_text, write_files
     from lg_husky_sim.folders import check_folder, result_folder
     from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
     from lg_husky_sim.recording import read_recording, TopicMap

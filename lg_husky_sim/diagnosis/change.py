@@ -41,7 +41,7 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     before = whole.subset([piece.recording in baseline for piece in whole.pieces])
     known = search(before, nominal.structure, nominal.parameters,
                    lambda text, share: progress(f'before the change: {text}', 0.4 * share),
-                   most=BEFORE, onsets=False)
+                   most=BEFORE, onsets=False, eager=True)
     first = next(piece for piece in whole.pieces if piece.recording not in baseline)
     onset = Onset(OnsetKind.TIME, first.start, first.recording)
     return search(whole, known.final.structure, nominal.parameters,

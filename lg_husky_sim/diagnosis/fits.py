@@ -142,15 +142,13 @@ def recalibrate(observations: Observations, structure: Structure, nominal: Param
     sizes: Mapping[str, float] = {p: at[p] for p in at}
     start = sizes if begin is None else {**sizes, **begin.solution.values}
     predicted = observations.predict(compile_model(structure).at(at))
-    fit: Fit | None = None
-    for _ in range(3):
+    for again in (True, True, False):
         fit = fit_structure(observations, structure, nominal,
                             first_metric(observations, predicted), start, sizes)
         if fit is None:
             raise LgHuskyError('the nominal model cannot be evaluated')
-        predicted, start = fit.solution.predicted, fit.solution.values
-    if fit is None:
-        raise LgHuskyError("no calibration was made")
+        if again:
+            predicted, start = fit.solution.predicted, fit.solution.values
     return fit
 
 

@@ -20,7 +20,7 @@ from lg_husky_sim.husky.parameters import Parameters
 import numpy as np
 
 #: Gain from which something is missing, whatever it is [nats].
-CERTAIN = 32.0
+CERTAIN = 45.0
 #: A rival within this share of the winner's held-out gain, or this many nats, is as good.
 NEAR_SHARE = 0.06
 NEAR_NATS = 10.0
@@ -84,12 +84,13 @@ def findings(search: Search) -> tuple[Finding, ...]:
         gain = held_out_cost(observations, one.base, one.metric, folds) - held_out_cost(
             observations, best.fit, one.metric, folds)
         regime = where_it_shows(observations, gain)
-        statement = (f'{effect.kind.title}{_side_words(effect)}{onset_words(best.onset)}: '
+        onset = final.structure.onset if effect.late and search.change is None else None
+        statement = (f'{effect.kind.title}{_side_words(effect)}{onset_words(onset)}: '
                      f'{in_words(numbers)}. It shows {regime} and explains '
                      f'{100.0 * min(max(one.share, 0.0), 1.0):.0f} % of what was unexplained.')
         found.append(Finding(
             effect.id, effect.side, effect.kind.subsystem.value, effect.kind.elements, regime,
-            final.structure.onset if effect.late or best.onset else None, numbers,
+            onset, numbers,
             best.held_out, p_value(best.gain, len(names), hypotheses), one.share,
             _rivals(one, effect), statement[0].upper() + statement[1:]))
     return tuple(found)

@@ -29,13 +29,13 @@ import numpy as np
 #: Candidates that are refitted in a round.
 SERIOUS = 6
 #: Of these, those that are refitted to the end.
-POLISHED = 4
+POLISHED = 5
 #: Least held-out gain of an adopted effect, always there or late [nats].
 LEAST_GAIN = (18.0, 40.0)
 #: Least share of the unexplained energy that the first effect must explain, always there or
 #: late: where the rest is near the sensors' noise, and where much remains unexplained.
 LEAST_SHARE = (0.003, 0.02)
-LARGE_SHARE = (0.03, 0.06)
+LARGE_SHARE = (0.015, 0.06)
 #: Energy per value of the rest from which much remains unexplained.
 MUCH = 7.0
 #: The same for a further effect: share, or a smaller one with a large gain.
@@ -43,6 +43,8 @@ FURTHER_SHARE = 0.2
 FURTHER_GAIN = (100.0, 0.06)
 #: Largest ratio of losses to gains over held-out blocks.
 UNSTABLE = 0.35
+#: How much more a change must explain after it than in any recording before it.
+PLACEBO = 2.0
 #: What a late effect must gain more than the same one without an onset: nats and share.
 LATER = (12.0, 0.08)
 
@@ -106,7 +108,7 @@ class Round:
 
 def play_round(observations: Observations, base: Fit, nominal: Parameters,
                pool: Sequence[Candidate], masks: Sequence[Onsets], folds: FloatArray,
-               number: int, only_late: bool = False) -> Round:
+               number: int, only_late: bool = False, eager: bool = False) -> Round:
     """
     Play one round of the search.
 
@@ -122,7 +124,10 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     number : int
         Effects that were adopted before.
     only_late : bool
-        Whether only effects with an onset are asked for.
+        Whether only effects with an onset are asked for: what changed between recordings.
+    eager : bool
+        Whether to adopt whatever predicts held-out data better: for a good description, not for
+        a name.
 
     Returns
     -------
@@ -138,8 +143,8 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     plain_metric = Metric(common.scale, {name: np.ones(1) for name in common.filters})
     broad = screen(observations, base, plain_metric, signatures, masks if late else ())
     if only_late:
-        scores = [s for s in scores if s.onset is not None]
-        broad = [s for s in broad if s.onset is not None]
+        scores = beyond_placebo([s for s in scores if s.onset is not None])
+        broad = beyond_placebo([s for s in broad if s.onset is not None])
     serious = _serious(scores, SERIOUS)
     chosen = {(s.signature.candidate.label, s.onset is None) for s in serious}
     serious += [s for s in _serious(broad, SERIOUS // 2)
@@ -154,11 +159,18 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
         if best_try is not None:
             quick.append((score, best_try))
     near = sorted(quick, key=lambda pair: pair[1].solution.cost)[:POLISHED]
-    fits = [(score, refit(observations, base, nominal, score, common, 4, fit))
+    fits = [(score, refit(observations, base, nominal, score, common, 6, fit))
             for score, fit in near]
     usable = [(score, fit) for score, fit in fits if fit is not None]
     rebased = fit_structure(observations, base.structure, nominal, common,
                             base.solution.values, base.parameters) or base
+    if usable:
+        # The base again from where the best candidate ended: a better optimum is no effect.
+        best = min(usable, key=lambda pair: pair[1].solution.cost)[1]
+        again = fit_structure(observations, base.structure, nominal, common,
+                              best.solution.values, base.parameters)
+        if again is not None and again.solution.cost < rebased.solution.cost:
+            rebased = again
     if not usable:
         count = float(np.count_nonzero(common.scale))
         return Round(rebased, tuple(scores), (), common, 0.0, False, 1.0,
@@ -182,8 +194,29 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     cost = held_out_cost(observations, rivals[0].fit, final, folds)
     unstable = instability(observations, cost_base - cost)
     rest = after / count
-    adopted = _adopts(rivals[0], share, unstable, rest, number, only_late)
+    adopted = (rivals[0].held_out > LEAST_GAIN[0] and unstable < UNSTABLE and share > 0.0
+               if eager else _adopts(rivals[0], share, unstable, rest, number, only_late))
     return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted, unstable, rest)
+
+
+def beyond_placebo(scores: Sequence[Score]) -> list[Score]:
+    """
+    Keep the changes that explain more than they would if made elsewhere.
+
+    Where a model is wrong in the same way before and after a change, an effect that is switched
+    on in any one recording explains something; only one that explains several times as much
+    where the change was is a change.
+
+    Parameters
+    ----------
+    scores : sequence of Score
+        Each with its ``placebo``.
+
+    Returns
+    -------
+    list of Score
+    """
+    return [s for s in scores if s.gain > PLACEBO * s.placebo + LEAST_GAIN[0]]
 
 
 def _rank(rival: Rival) -> float:
@@ -196,6 +229,10 @@ def _rank(rival: Rival) -> float:
 def _adopts(best: Rival, share: float, unstable: float, rest: float, number: int,
             change: bool) -> bool:
     late = int(best.onset is not None and not change)
+    own = {p.name for p in best.effect.parameters()}
+    if any(name in own and best.fit.parameters[name] == best.fit.parameters.entry(name).lower == 0.0
+           for name in best.fit.solution.at_bound):
+        return False
     if best.held_out < LEAST_GAIN[late] or unstable > UNSTABLE:
         return False
     if number > 0:

@@ -69,12 +69,15 @@ class Score:
     size : tuple of float
         Best multiples of the columns.
     onset : Onset or None
+    placebo : float
+        Largest gain when it is on in a single recording before the onset instead [nats].
     """
 
     signature: Signature
     gain: float
     size: tuple[float, ...]
     onset: Onset | None = None
+    placebo: float = 0.0
 
 
 def signatures_of(candidate: Candidate, structure: Structure, parameters: Parameters,
@@ -266,11 +269,14 @@ class Onsets:
         Number of groups.
     onsets : tuple of (Onset, numpy.ndarray of bool, shape (n_groups,))
         Each with the groups that lie after it.
+    placebos : tuple of numpy.ndarray of bool, shape (n_groups,)
+        Groups in which an effect is switched on for comparison.
     """
 
     groups: NDArray[np.int64]
     count: int
     onsets: tuple[tuple[Onset, NDArray[np.bool_]], ...]
+    placebos: tuple[NDArray[np.bool_], ...] = ()
 
 
 def _places(observations: Observations) -> tuple[NDArray[np.int64], FloatArray]:
@@ -336,7 +342,9 @@ def one_onset(observations: Observations, onset: Onset) -> Onsets:
     """
     owner, _ = _places(observations)
     number = observations.recordings.index(onset.recording)
-    return Onsets((owner >= number).astype(np.int64), 2, ((onset, np.array([False, True])),))
+    cells = np.arange(len(observations.recordings))
+    return Onsets(owner, cells.size, ((onset, cells >= number),),
+                  tuple(cells == i for i in range(number)))
 
 
 def place_onsets(observations: Observations) -> Onsets:
@@ -401,7 +409,9 @@ def scan(projector: Projector, signatures: Sequence[Signature],
             if not family.onsets:
                 continue
             sums = projector.sums(signature.columns, family.groups, family.count)
+            placebo = max((sums.gain(groups, signature.free_sign)[0]
+                           for groups in family.placebos), default=0.0)
             for onset, groups in family.onsets:
                 gain, size = sums.gain(groups, signature.free_sign)
-                offer(Score(signature, gain, size, onset))
+                offer(Score(signature, gain, size, onset, placebo))
     return sorted(best.values(), key=lambda s: -s.gain)

@@ -19,9 +19,9 @@ from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.evidence import folds_of
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate
 from lg_husky_sim.diagnosis.onset import refined_onset
-from lg_husky_sim.diagnosis.rounds import play_round, Round
+from lg_husky_sim.diagnosis.rounds import LEAST_GAIN, play_round, Round
 from lg_husky_sim.diagnosis.screening import one_onset, Onsets, place_onsets, time_onsets
-from lg_husky_sim.husky.effects import Onset
+from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
@@ -29,6 +29,8 @@ from lg_husky_sim.identification.problem import Observations
 
 #: Most effects that are named.
 MOST = 3
+#: Loss per value below which an earlier effect is dropped again [nats].
+IDLE = 0.002
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +46,15 @@ class Search:
     final : Fit
         With the adopted effects.
     rounds : tuple of Round
+    change : Onset or None
+        Where every effect begins, if what changed between recordings was asked for.
     """
 
     observations: Observations
     plain: Fit
     final: Fit
     rounds: tuple[Round, ...] = field(default=())
+    change: Onset | None = None
 
 
 Progress = Callable[[str, float], None]
@@ -61,7 +66,7 @@ def _silent(text: str, share: float) -> None:
 
 def search(observations: Observations, structure: Structure, nominal: Parameters,
            progress: Progress = _silent, most: int = MOST, onsets: bool = True,
-           change: Onset | None = None, start: Fit | None = None) -> Search:
+           change: Onset | None = None, start: Fit | None = None, eager: bool = False) -> Search:
     """
     Search the catalogue.
 
@@ -81,6 +86,8 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         Where every effect begins; nothing else is tried then.
     start : Fit, optional
         A fit of the structure to some of the data, to begin from.
+    eager : bool
+        Whether a good description is wanted rather than a name.
 
     Returns
     -------
@@ -98,13 +105,51 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
     for number in range(most + 1):
         progress(f'round {number + 1}: signatures and refits', number / (most + 1))
         one = play_round(observations, base, nominal, pool, masks, folds, number,
-                         only_late=change is not None)
+                         only_late=change is not None, eager=eager)
         rounds.append(one)
         if not one.adopted or number == most:
             break
         base = with_better_onset(observations, one.rivals[0].fit, nominal, one.metric,
                                  change is None)
-    return Search(observations, plain, base, tuple(rounds))
+        base = without_idle(observations, base, nominal, one.metric, structure)
+        kept = set(base.structure.effects)
+        rounds = [r for r in rounds if not r.adopted or _same(r, kept)]
+    return Search(observations, plain, base, tuple(rounds), change)
+
+
+def _same(one: Round, kept: set[Effect]) -> bool:
+    # Whether what a round adopted is still in.
+    return one.rivals[0].effect in kept
+
+
+def without_idle(observations: Observations, fit: Fit, nominal: Parameters, metric_: Metric,
+                 first: Structure) -> Fit:
+    """
+    Return a fit without the effects that a later one has made needless.
+
+    Parameters
+    ----------
+    observations : Observations
+    fit : Fit
+    nominal : Parameters
+    metric_ : Metric
+    first : Structure
+        Of the model in doubt: its own effects stay.
+
+    Returns
+    -------
+    Fit
+    """
+    for effect in fit.structure.effects[len(first.effects):-1]:
+        left = tuple(e for e in fit.structure.effects if e != effect)
+        onset = fit.structure.onset if any(e.late for e in left) else None
+        sizes = {**fit.parameters, **fit.solution.values}
+        again = fit_structure(observations, replace(fit.structure, effects=left, onset=onset),
+                              nominal, metric_, fit.solution.values, sizes, 4)
+        if again is not None and again.solution.cost - fit.solution.cost < max(
+                LEAST_GAIN[0], IDLE * len(observations.measured)):
+            return again
+    return fit
 
 
 def with_better_onset(observations: Observations, fit: Fit, nominal: Parameters,

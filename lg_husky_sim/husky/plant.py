@@ -11,6 +11,9 @@ from lg_husky_sim.husky.effects import Onset
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 
+#: Time over which an encoder counts its ticks to make a rate of them [s]: one period of the
+#: Husky's joint states (50 Hz).
+ENCODER_WINDOW = 0.02
 #: Rows of the output matrices.
 OUTPUTS = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate', 'current_left', 'current_right',
            'accel_x', 'voltage_left', 'voltage_right')
@@ -162,9 +165,10 @@ class Plant:
         Returns
         -------
         TimeSeries
-            The same columns; wheel rates and angles by the encoders' factors, yaw rate by the
-            gyro's factor and bias, every stream by its delay. Speed, distance, currents and
-            voltages are left as they are.
+            The same columns; wheel rates as means over :data:`ENCODER_WINDOW` (an encoder counts
+            ticks), wheel rates and angles by the encoders' factors, yaw rate by the gyro's factor
+            and bias, every stream by its delay. Speed, distance, currents and voltages are left
+            as they are.
         """
         late = np.zeros(len(truth), dtype=bool)
         if self.onset is not None:
@@ -183,6 +187,14 @@ class Plant:
 def _observed(truth: TimeSeries, sensors: SensorModel) -> FloatArray:
     values = np.array(truth.values)
     column = {name: i for i, name in enumerate(truth.names)}
+    before = truth.times - ENCODER_WINDOW
+    counted = before >= truth.times[0] - 1e-9
+    for side in ('left', 'right'):
+        angle = truth.values[:, column[f'angle_{side}']]
+        mean = (angle - np.interp(before, truth.times, angle)) / ENCODER_WINDOW
+        values[:, column[f'wheel_{side}']] = np.where(
+            counted, mean, truth.values[:, column[f'wheel_{side}']])
+    truth = TimeSeries(truth.times, values, truth.names)
     for streams, delay in ((('wheel_left', 'wheel_right', 'angle_left', 'angle_right'),
                             sensors.delay_wheels),
                            (('yaw_rate', 'accel_x'), sensors.delay_imu),

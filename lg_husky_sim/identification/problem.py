@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 from lg_husky_sim.errors import RecordingError
-from lg_husky_sim.husky.plant import Plant, SensorModel
+from lg_husky_sim.husky.plant import ENCODER_WINDOW, Plant, SensorModel
 from lg_husky_sim.identification.pieces import (
     Channel,
     CHANNELS,
@@ -299,7 +299,10 @@ def _seen(channel: Channel, piece: Piece, grid: FloatArray, angle: FloatArray,
     if name in ('wheel_left', 'wheel_right'):
         late = sensors.delay_wheels + extra.get('delay_wheels', 0.0)
         factor = sensors.encoder_left if name == 'wheel_left' else sensors.encoder_right
-        return factor * _sample(grid[:, _COLUMN[name]], start, channel.times - late)
+        angles = grid[:, _COLUMN[name.replace('wheel', 'angle')]]
+        ends = channel.times - late
+        return factor * (_sample(angles, start, ends) - _sample(
+            angles, start, ends - ENCODER_WINDOW)) / ENCODER_WINDOW
     if name == 'yaw_rate':
         late = sensors.delay_imu + extra.get('delay_imu', 0.0)
         rate = _sample(grid[:, _COLUMN[name]], start, channel.times - late)
