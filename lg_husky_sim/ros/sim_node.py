@@ -66,9 +66,10 @@ def _run(args: Sequence[str] | None) -> int:
         print(f'error: {error}', file=sys.stderr)
         return 1
     node: Any = None
-    code = 0
+    joined, code = False, 0
     try:
         api.init(args=list(sys.argv if args is None else args))
+        joined = True
         from lg_husky_sim.ros.simulation_node import SimNode
         node = SimNode(NAME, started=started)
         # What is loaded now stays: the garbage collector need not look through it at each turn,
@@ -77,9 +78,14 @@ def _run(args: Sequence[str] | None) -> int:
         api.spin(node)
     except (KeyboardInterrupt, Interrupted, api.ExternalShutdownException):
         code = 0
-    except api.USER_ERRORS as error:
-        print(f'error: {" ".join(str(error).split())}', file=sys.stderr)
-        code = 1
+    except Exception as error:
+        # A signal takes the node out of the graph while it is still being put together; what
+        # then fails is no mistake.
+        if not joined or api.ok():
+            if not isinstance(error, api.USER_ERRORS):
+                raise
+            print(f'error: {" ".join(str(error).split())}', file=sys.stderr)
+            code = 1
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)
