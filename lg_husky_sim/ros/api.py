@@ -22,7 +22,7 @@ HAVE_RCLPY = find_spec('rclpy') is not None
 if TYPE_CHECKING or not HAVE_RCLPY:
     if find_spec('cyclonedds') is None:
         raise MissingExtraError(
-            "neither rclpy nor cyclonedds is installed: source a ROS 2 setup file, or "
+            'neither rclpy nor cyclonedds is installed: source a ROS 2 setup file, or '
             "pip install 'lg_husky_sim[dds,bags]'")
     from lg_husky_sim.ros.embedded.context import (
         ExternalShutdownException,

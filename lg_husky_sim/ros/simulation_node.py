@@ -234,7 +234,7 @@ class SimNode(Node):
         self.reset(time=True)
         self.stopped = True
 
-    def quit(self) -> None:
+    def end(self) -> None:
         """End the node as Ctrl-C does, once the answer to the request is out."""
         self.create_timer(0.2, lambda: leave(self))
 

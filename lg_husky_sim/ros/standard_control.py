@@ -65,7 +65,7 @@ class Simulation(Protocol):
     def stop(self) -> None:
         """Pause, in the initial state at time zero."""
 
-    def quit(self) -> None:
+    def end(self) -> None:
         """End the node."""
 
 
@@ -119,7 +119,7 @@ class StandardControl:
             response.result.result = _ALREADY
             response.result.error_message = 'already in this state'
         elif wanted == _QUITTING:
-            one.quit()
+            one.end()
         elif wanted == _STOPPED:
             one.stop()
         elif wanted in (_PLAYING, _PAUSED):

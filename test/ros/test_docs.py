@@ -61,7 +61,7 @@ def test_the_urdf_has_the_models_measures_and_joint_names() -> None:
 
 
 def test_layouts_show_topics_that_exist() -> None:
-    """RViz' and Foxglove's files parse, and name topics of the default preset."""
+    """The files for RViz and Foxglove parse, and name topics of the default preset."""
     settings = make_settings()
     known = {settings.command_topic, settings.odometry_topic, '/ground_truth', 'ground_truth',
              settings.imu_topic, settings.joint_states_topic, 'robot_description',
