@@ -30,7 +30,7 @@ def drive(name: str = 'circle', truth: Mapping[str, float] = TRUTH, seed: int = 
             p.parameter() for e in structure.effects for p in e.parameters()))
     plant = compile_model(structure or model.structure).at(parameters.replacing(truth))
     commands = find_manoeuvre(name).commands()
-    seen = rollout(plant, commands, float(commands.times[-1]), 0.02)
+    seen = plant.observe(rollout(plant, commands, float(commands.times[-1]), 0.02))
     draws = np.random.default_rng(seed)
 
     def noisy(columns: tuple[str, ...], kind: str) -> np.ndarray:
