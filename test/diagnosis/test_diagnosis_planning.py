@@ -1,0 +1,69 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The drive that tells two explanations apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from lg_husky_sim.cli.main import run
+from lg_husky_sim.diagnosis.planning import drives, imitated, plan, typical
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.manoeuvres import load_manoeuvre
+import numpy as np
+import pytest
+
+
+def test_drives_keep_to_the_limits_and_end_at_rest() -> None:
+    for manoeuvre in drives(0.6, 0.4):
+        values = manoeuvre.commands().values
+        assert np.max(np.abs(values), axis=0) == pytest.approx(
+            np.minimum(np.max(np.abs(values), axis=0), [0.6, 0.4]))
+        assert not np.any(values[0])
+        assert not np.any(values[-1])
+
+
+def test_straight_run_tells_a_gyro_bias_from_a_smaller_wheel_and_a_spin_does_not() -> None:
+    model = load_model()
+    one, two = (typical(name, model.structure, model.parameters)
+                for name in ('gyro_bias', 'wheel_radius_mismatch'))
+    chosen = [m for m in drives(0.8, 0.8) if m.name in ('long_straight', 'spin_rates')]
+    best, worst = plan(one, two, chosen)
+    assert best.manoeuvre.name == 'long_straight'
+    assert best.nats > 50.0 * worst.nats
+    assert best.channel == 'yaw_rate'
+
+
+def test_an_explanation_imitates_itself() -> None:
+    model = load_model()
+    one = typical('rolling_resistance', model.structure, model.parameters)
+    (manoeuvre,) = (m for m in drives(0.8, 0.8) if m.name == 'two_speeds')
+    assert imitated(one, one, manoeuvre)[0] < 0.5
+
+
+def test_command_writes_a_script_that_can_be_driven(tmp_path: Path, capsys: Any) -> None:
+    out = tmp_path / 'script.yaml'
+    assert run(['plan-drive', '--effects', 'yaw_scrub_coulomb,command_latency',
+                '--out', str(out), '--max-speed', '0.5']) == 0
+    script = load_manoeuvre(out)
+    assert np.max(np.abs(script.commands().column('forward'))) <= 0.5
+    assert 'yaw_scrub_coulomb' in script.about
+    assert 'nats' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    ([], 'either the folder'),
+    (['--effects', 'slope'], 'two different ids'),
+    (['--effects', 'slope,slope'], 'two different ids'),
+    (['--effects', 'slope,sloppe'], 'did you mean slope'),
+    (['nowhere'], 'no folder of a diagnosis'),
+])
+def test_bad_input_is_one_line(arguments: list[str], message: str, tmp_path: Path,
+                               capsys: Any) -> None:
+    assert run(['plan-drive', *arguments, '--out', str(tmp_path / 's.yaml')]) == 1
+    text = capsys.readouterr().err
+    assert text.startswith('error: ')
+    assert text.count('\n') == 1
+    assert message in text
+    assert not (tmp_path / 's.yaml').exists()
