@@ -141,7 +141,7 @@ def genetic_rows(quick: bool) -> None:
     say('  the same with a numpy simulator that steps one by one (extrapolated)', f'{slow:.0f} s')
     say('  faster by', f'{slow / whole:.0f} ×', 'at least 100')
     with without_numba():
-        plain = best(lambda: objective(draws[:100]), 1)
+        plain = best(lambda: objective(draws[:100]))
     say('  numpy on all candidates at once (no numba), whole GA',
         f'{plain * found.evaluations / 100:.1f} s')
 
