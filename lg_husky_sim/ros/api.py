@@ -24,6 +24,7 @@ if TYPE_CHECKING or not HAVE_RCLPY:
         raise MissingExtraError(
             'neither rclpy nor cyclonedds is installed: source a ROS 2 setup file, or '
             "pip install 'lg_husky_sim[dds,bags]'")
+    from lg_husky_sim.ros.embedded.clock import Duration, Time
     from lg_husky_sim.ros.embedded.context import (
         ExternalShutdownException,
         init,
@@ -47,7 +48,6 @@ if TYPE_CHECKING or not HAVE_RCLPY:
         ReliabilityPolicy,
     )
     from lg_husky_sim.ros.embedded.spin import SingleThreadedExecutor, spin, spin_once
-    from lg_husky_sim.ros.embedded.time import Duration, Time
 
     #: What a user's mistake raises; its message is one line.
     USER_ERRORS: tuple[type[Exception], ...] = (LgHuskyError, ParameterException)
@@ -86,6 +86,7 @@ def message_type(name: str) -> Any:
     ----------
     name : str
         Such as ``nav_msgs/msg/Odometry``.
+
     """
     package, _, kind = name.split('/')
     if not HAVE_RCLPY:
@@ -112,6 +113,7 @@ def service_type(name: str) -> Any:
     ----------
     name : str
         Such as ``std_srvs/srv/Trigger``.
+
     """
     package, _, kind = name.split('/')
     if not HAVE_RCLPY:

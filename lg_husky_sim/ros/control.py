@@ -55,6 +55,7 @@ class Control:
     ----------
     node : Node
     simulation : Controlled
+
     """
 
     def __init__(self, node: Node, simulation: Controlled) -> None:

@@ -32,11 +32,13 @@ def twist_from_msg(msg: Any) -> BodyTwist:
     Parameters
     ----------
     msg : geometry_msgs.msg.Twist
+        As received.
 
     Returns
     -------
     BodyTwist
         Not checked: it may hold NaN.
+
     """
     return BodyTwist(float(msg.linear.x), float(msg.angular.z))
 
@@ -48,11 +50,13 @@ def pose_from_msg(msg: Any) -> Pose:
     Parameters
     ----------
     msg : geometry_msgs.msg.Pose
+        As received.
 
     Returns
     -------
     Pose
         Not checked; the quaternion need not be of unit length.
+
     """
     q = msg.orientation
     heading = math.atan2(2.0 * (q.w * q.z + q.x * q.y),
@@ -89,8 +93,10 @@ def odometry_message(settings: Settings, *, truth: bool) -> Any:
     Parameters
     ----------
     settings : Settings
+        Frames and covariances.
     truth : bool
         Whether it will hold the model's truth, which is exact.
+
     """
     message = message_type('nav_msgs/msg/Odometry')()
     message.header.frame_id = settings.odom_frame
@@ -108,10 +114,14 @@ def fill_odometry(message: Any, nanoseconds: int, pose: Pose, twist: BodyTwist) 
     Parameters
     ----------
     message : nav_msgs.msg.Odometry
+        Changed in place.
     nanoseconds : int
         Stamp.
     pose : Pose
+        In the frame of the header.
     twist : BodyTwist
+        In the child frame.
+
     """
     set_stamp(message.header.stamp, nanoseconds)
     position = message.pose.pose.position
@@ -136,10 +146,12 @@ def fill_joint_state(message: Any, nanoseconds: int, reading: Reading) -> None:
     Parameters
     ----------
     message : sensor_msgs.msg.JointState
+        Changed in place.
     nanoseconds : int
         Stamp.
     reading : Reading
         Both wheels of a side turn alike and share its torque.
+
     """
     set_stamp(message.header.stamp, nanoseconds)
     message.position = [*reading.measured.wheel_angles] * 2
@@ -164,9 +176,12 @@ def fill_imu(message: Any, nanoseconds: int, reading: Reading) -> None:
     Parameters
     ----------
     message : sensor_msgs.msg.Imu
+        Changed in place.
     nanoseconds : int
         Stamp.
     reading : Reading
+        Of the step.
+
     """
     set_stamp(message.header.stamp, nanoseconds)
     measured = reading.measured

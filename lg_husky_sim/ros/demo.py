@@ -40,6 +40,7 @@ class Demo:
         From the start of the node's process to its first odometry [s].
     exit_code : int
         Of the node after Ctrl-C.
+
     """
 
     counts: dict[str, int]
@@ -83,6 +84,7 @@ def run_demo(manoeuvre: Manoeuvre, bag: Path, settings: Settings, model: str = '
     ------
     RecordingError
         If the node does not come up or the driver fails.
+
     """
     api.init(args=[])
     node = api.Node(NAME)

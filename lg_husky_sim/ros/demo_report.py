@@ -27,6 +27,7 @@ class Drive:
     truth, wheels : numpy.ndarray, shape (n, 6)
         Time [s], x, y [m], heading [rad], forward [m/s], yaw rate [rad/s] of ground truth and
         wheel odometry.
+
     """
 
     command: FloatArray
@@ -41,6 +42,7 @@ def read_drive(bag: Path, command: str, truth: str, wheels: str) -> Drive:
     Parameters
     ----------
     bag : Path
+        Folder of a rosbag2.
     command, truth, wheels : str
         Full names of the topics.
 
@@ -48,6 +50,7 @@ def read_drive(bag: Path, command: str, truth: str, wheels: str) -> Drive:
     -------
     Drive
         Times since the first truth; those of the commands are when they arrived.
+
     """
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import get_typestore, Stores
@@ -92,11 +95,14 @@ def draw_speed(axes: Axes, drive: Drive, column: int, label: str) -> None:
     Parameters
     ----------
     axes : matplotlib.axes.Axes
+        Drawn into.
     drive : Drive
+        What to draw.
     column : int
         0 forward, 1 yaw.
     label : str
         Of the ordinate.
+
     """
     axes.step(drive.command[:, 0], drive.command[:, 1 + column], where='post', color='0.6',
               label='command')

@@ -21,6 +21,7 @@ class Diagnostics:
     Parameters
     ----------
     node : Node
+
     """
 
     def __init__(self, node: Node) -> None:
@@ -49,6 +50,7 @@ class Diagnostics:
             Time between steps [ns]; a step later than this is a late one.
         simulated : float
             Simulated time that it advanced [s].
+
         """
         self.total += 1
         self._steps += 1
@@ -67,9 +69,12 @@ class Diagnostics:
         now_ns : int
             Steady clock [ns].
         stamp_ns : int
+            Stamp of the message [ns].
         wanted_rate : float
             Steps wanted in a second; 0 if as many as possible.
         paused : bool
+            Whether the simulation stands.
+
         """
         if self._since == 0:
             self._since = now_ns

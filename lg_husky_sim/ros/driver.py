@@ -24,6 +24,7 @@ def drive(manoeuvre: Manoeuvre, settings: Settings, *, wait: float = 10.0,
     Parameters
     ----------
     manoeuvre : Manoeuvre
+        What to drive.
     settings : Settings
         Topic and type of the command.
     wait : float
@@ -40,6 +41,7 @@ def drive(manoeuvre: Manoeuvre, settings: Settings, *, wait: float = 10.0,
     ------
     CommandError
         If nobody listens.
+
     """
     node = api.Node(NAME)
     executor = api.SingleThreadedExecutor()

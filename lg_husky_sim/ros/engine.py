@@ -44,6 +44,7 @@ class Reading(NamedTuple):
         Of one wheel of the left and of the right side [N·m].
     voltage, current : float
         Battery [V], [A]; the current is negative while discharging.
+
     """
 
     step: int
@@ -66,6 +67,7 @@ def read_model(path: str) -> ModelFile:
     ------
     SettingsError
         With the path and the reason, if it cannot be used.
+
     """
     try:
         return load_model(path or None)
@@ -90,8 +92,10 @@ def limited(last: BodyTwist, wanted: BodyTwist, settings: Settings) -> BodyTwist
     last : BodyTwist
         What went to the motors in the step before.
     wanted : BodyTwist
+        What is commanded.
     settings : Settings
         Limits of zero are off.
+
     """
     period = settings.period
     return BodyTwist(
@@ -112,6 +116,7 @@ class Engine:
     ------
     SettingsError
         If the model file cannot be used.
+
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -159,11 +164,13 @@ class Engine:
         Parameters
         ----------
         twist : BodyTwist
+            What arrived.
 
         Returns
         -------
         bool
             False if it holds NaN or infinity; the command before then stays.
+
         """
         if not (math.isfinite(twist.forward) and math.isfinite(twist.yaw)):
             return False
@@ -219,6 +226,7 @@ class Engine:
             Whether simulated time and the sensors' noise start anew as well.
         twist : BodyTwist, optional
             Motion to begin with; at rest if not given.
+
         """
         self._begin(pose or self._initial_pose(), 0 if time else self.step_count, twist)
         return self.reading
@@ -241,6 +249,7 @@ class Engine:
         ------
         SettingsError
             If the model file cannot be used; the old one then stays.
+
         """
         before = self.settings
         self.settings = settings

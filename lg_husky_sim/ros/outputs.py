@@ -25,6 +25,7 @@ class Outputs:
     ----------
     node : Node
     settings : Settings
+
     """
 
     def __init__(self, node: Node, settings: Settings) -> None:
@@ -88,8 +89,10 @@ class Outputs:
         Parameters
         ----------
         reading : Reading
+            Of the step.
         nanoseconds : int
             Stamp of the step.
+
         """
         step = self._steps
         self._steps += 1

@@ -23,6 +23,7 @@ class Pace:
         Steps in a simulated second [Hz].
     speed : float
         Simulated seconds in a second; positive.
+
     """
 
     anchor_ns: int
@@ -43,6 +44,7 @@ class Pace:
             Steady clock [ns].
         done : int
             Steps done so far.
+
         """
         passed = (now_ns - self.anchor_ns) * self.rate * self.speed / _SECOND
         return max(0, self.anchor_step + int(passed + 1e-6) - done)
@@ -69,6 +71,7 @@ class Stamps:
     anchor_step : int
     spacing : float
         Between steps [ns].
+
     """
 
     anchor_ns: int

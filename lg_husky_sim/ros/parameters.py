@@ -54,6 +54,7 @@ def declare_settings(node: Node) -> Settings:
     Parameters
     ----------
     node : Node
+        Gets the parameters.
 
     Returns
     -------
@@ -63,6 +64,7 @@ def declare_settings(node: Node) -> Settings:
     ------
     SettingsError
         If a given name is unknown, or a value not allowed.
+
     """
     given = {name: parameter.value for name, parameter in parameter_overrides(node).items()
              if name.split('.')[0] not in _OF_ROS}
@@ -89,6 +91,7 @@ class LiveSettings:
     settings : Settings
     apply : callable
         Receives new settings; may refuse them with a SettingsError.
+
     """
 
     def __init__(self, node: Node, settings: Settings, apply: Callable[[Settings], None]) -> None:
@@ -122,6 +125,7 @@ class LiveSettings:
         ------
         SettingsError
             If a value is not allowed.
+
         """
         settings = replace(self._settings, **values)  # type: ignore[arg-type]
         self._apply(settings)

@@ -56,6 +56,7 @@ class Recorder:
     ------
     RecordingError
         If something is at the path, or the storage is unknown.
+
     """
 
     def __init__(self, node: api.Node, path: Path, topics: Mapping[str, str],
@@ -100,6 +101,7 @@ class Recorder:
         ----------
         keep : bool
             Whether the bag shall appear at its path, or be thrown away.
+
         """
         if self._writer is None:
             return
@@ -122,6 +124,7 @@ def record(path: Path, settings: Settings, *, storage: str = 'mcap',
     settings : Settings
         Names of the topics.
     storage : str
+        ``mcap`` or ``sqlite3``.
     seconds : float, optional
         How long [s].
 
@@ -129,6 +132,7 @@ def record(path: Path, settings: Settings, *, storage: str = 'mcap',
     -------
     dict
         Messages of each topic.
+
     """
     node = api.Node(NAME)
     executor = api.SingleThreadedExecutor()

@@ -29,6 +29,7 @@ class Measured(NamedTuple):
         Specific force along x, y, z of the IMU [m/s²] (REP-145: +g on z at rest).
     heading : float
         Of the orientation in the IMU [rad].
+
     """
 
     wheel_rates: tuple[float, float]
@@ -61,6 +62,7 @@ class Sensors:
     Parameters
     ----------
     settings : Settings
+
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -93,8 +95,12 @@ class Sensors:
         Parameters
         ----------
         state : SimulatorState
+            Truth.
         plant : Plant
+            Whose sensor effects count.
         settings : Settings
+            Noise, bias and rounding.
+
         """
         model = sensor_model(plant, state)
         rate_left, rate_right, forward, yaw, _, _, ahead, *_ = state.row.tolist()

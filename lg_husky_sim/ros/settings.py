@@ -40,6 +40,7 @@ class Setting:
         Allowed texts; empty if any will do.
     live : bool
         Whether it may change while the node runs.
+
     """
 
     name: str
@@ -70,6 +71,7 @@ class Setting:
         ------
         SettingsError
             If it has another type or is out of range.
+
         """
         problem = SettingsError(f'{self.name} = {value!r} is not allowed: {self.allowed()}')
         if self.kind is tuple:
@@ -259,6 +261,7 @@ class Settings:
         ------
         SettingsError
             If the sensor's rate does not divide the node's.
+
         """
         own: float = getattr(self, name)
         if own == 0.0:
@@ -286,6 +289,7 @@ def preset_values(preset: str = DEFAULT_PRESET) -> dict[str, Any]:
     ------
     SettingsError
         If there is no such preset.
+
     """
     BY_NAME['preset'].checked(preset)
     common, presets = _presets()
@@ -301,6 +305,7 @@ def check_names(names: Mapping[str, object] | set[str]) -> None:
     ------
     SettingsError
         With the nearest names there are.
+
     """
     for name in sorted(set(names) - set(BY_NAME)):
         near = difflib.get_close_matches(name, BY_NAME, n=1, cutoff=0.5)
@@ -323,6 +328,7 @@ def make_settings(values: Mapping[str, object] | None = None, **more: object) ->
     ------
     SettingsError
         If a name is unknown, or a value not allowed.
+
     """
     given = {**(values or {}), **more}
     check_names(given)

@@ -8,8 +8,9 @@ The node: translates messages and paces steps; the physics is elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import gc
+import os
 import signal
 import sys
 import time
@@ -30,8 +31,19 @@ class Interrupted(BaseException):
     """
 
 
+def _leave(number: int, frame: FrameType | None) -> None:
+    # Nothing is open yet. An exception would not do: an extension module turns it into an
+    # ImportError while it is being loaded.
+    os._exit(0)
+
+
 def _interrupt(number: int, frame: FrameType | None) -> None:
     raise Interrupted
+
+
+def _on_signals(handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handler)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -47,10 +59,10 @@ def main(args: Sequence[str] | None = None) -> int:
     -------
     int
         0 after a clean end, 1 if arguments, parameters or files are wrong.
+
     """
     # Imports take most of the start; a signal during them ends the process cleanly as well.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+    _on_signals(_leave)
     try:
         return _run(args)
     except (KeyboardInterrupt, Interrupted):
@@ -62,15 +74,16 @@ def _run(args: Sequence[str] | None) -> int:
     from lg_husky_sim.errors import LgHuskyError
     try:
         from lg_husky_sim.ros import api
+        from lg_husky_sim.ros.simulation_node import SimNode
     except LgHuskyError as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
     node: Any = None
     joined, code = False, 0
+    _on_signals(_interrupt)
     try:
         api.init(args=list(sys.argv if args is None else args))
         joined = True
-        from lg_husky_sim.ros.simulation_node import SimNode
         node = SimNode(NAME, started=started)
         # What is loaded now stays: the garbage collector need not look through it at each turn,
         # which would make steps late.
@@ -87,8 +100,7 @@ def _run(args: Sequence[str] | None) -> int:
             print(f'error: {" ".join(str(error).split())}', file=sys.stderr)
             code = 1
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
+        _on_signals(signal.SIG_IGN)
         if node is not None:
             node.destroy_node()
         api.try_shutdown()

@@ -45,6 +45,7 @@ class SimNode(Node):
     ------
     SettingsError
         If parameters or model file are wrong.
+
     """
 
     def __init__(self, name: str, *, started: float | None = None, **kwargs: Any) -> None:
@@ -240,7 +241,7 @@ class SimNode(Node):
 
     @property
     def reading(self) -> Reading:
-        """The last step."""
+        """Return the last step."""
         return self.engine.reading
 
     @property
@@ -262,6 +263,7 @@ class SimNode(Node):
         ------
         SettingsError
             If a value is not allowed.
+
         """
         self._live.changed(**values)
 

@@ -41,11 +41,11 @@ class Simulation(Protocol):
 
     @property
     def reading(self) -> Reading:
-        """The last step."""
+        """Return the last step."""
 
     @property
     def odom_frame(self) -> str:
-        """Frame of poses."""
+        """Return the frame of poses."""
 
     def pause(self, paused: bool) -> None:
         """Pause or resume."""
@@ -82,6 +82,7 @@ class StandardControl:
     ----------
     node : Node
     simulation : Simulation
+
     """
 
     def __init__(self, node: Node, simulation: Simulation) -> None:

@@ -28,6 +28,7 @@ class WheelOdometry:
         Velocities averaged in the twist.
     pose : Pose
         Where to begin.
+
     """
 
     def __init__(self, radius: float, track: float, window: int, pose: Pose) -> None:
@@ -56,6 +57,7 @@ class WheelOdometry:
             Angles turned [rad].
         period : float
             Time between the readings [s].
+
         """
         way = 0.5 * self._radius * (left + right)
         turn = self._radius * (right - left) / self._track

@@ -39,6 +39,7 @@ def isolated_domain() -> Iterator[int]:
     ------
     SettingsError
         If all domains are taken.
+
     """
     names = ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS',
              'ROS_LOCALHOST_ONLY')
@@ -80,6 +81,7 @@ class NodeProcess:
         More after ``--ros-args``, such as remappings.
     environment : mapping, optional
         Variables to add.
+
     """
 
     def __init__(self, parameters: Mapping[str, object] | None = None,
@@ -108,6 +110,7 @@ class NodeProcess:
         Parameters
         ----------
         number : signal.Signals
+            Which.
         timeout : float
             [s]; after it the process is killed.
 
@@ -115,6 +118,7 @@ class NodeProcess:
         -------
         int
             Exit code; negative if a signal ended the process.
+
         """
         if self.process.poll() is None:
             self.process.send_signal(number)
@@ -132,6 +136,7 @@ class Probe:
     Parameters
     ----------
     name : str
+
     """
 
     def __init__(self, name: str = 'probe') -> None:
@@ -164,6 +169,7 @@ class Probe:
         Parameters
         ----------
         condition : callable
+            Called without arguments again and again.
         timeout : float
             Longest wait [s].
 
@@ -171,6 +177,7 @@ class Probe:
         -------
         bool
             Whether it became true.
+
         """
         end = time.monotonic() + timeout
         while not condition():
@@ -194,6 +201,7 @@ class LiveHusky:
     parameters, arguments, environment
         As for :class:`NodeProcess`.
     probe : Probe
+
     """
 
     def __init__(self, probe: Probe, parameters: Mapping[str, object] | None = None,
@@ -211,6 +219,7 @@ class LiveHusky:
         ------
         SettingsError
             With the node's log, if none comes.
+
         """
         def over() -> bool:
             return bool(received) or self.node.process.poll() is not None

@@ -28,6 +28,7 @@ class LockStepHusky:
     ------
     SettingsError
         If a parameter is unknown or its value not allowed.
+
     """
 
     def __init__(self, **settings: object) -> None:
@@ -37,7 +38,7 @@ class LockStepHusky:
 
     @property
     def reading(self) -> Reading:
-        """What the node would have published last."""
+        """Return what the node would have published last."""
         return self.engine.reading
 
     def step(self, command: BodyTwist | None = None) -> Reading:
@@ -52,6 +53,7 @@ class LockStepHusky:
         Returns
         -------
         Reading
+
         """
         if command is not None:
             self.engine.command(command)
@@ -72,6 +74,7 @@ class LockStepHusky:
         -------
         TimeSeries
             :data:`COLUMNS` at the end of each step: truth and wheel odometry.
+
         """
         times: list[float] = []
         rows: list[tuple[float, ...]] = []

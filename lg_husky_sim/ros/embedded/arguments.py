@@ -97,6 +97,7 @@ def parse(args: Sequence[str]) -> Arguments:
     ------
     SettingsError
         If an option is unknown or incomplete, or a file cannot be read.
+
     """
     remaps: list[Rule] = []
     parameters: list[Rule] = []
@@ -157,6 +158,7 @@ class NodeNames:
     name, namespace : str
         After ``__node`` and ``__ns``.
     arguments : Arguments
+
     """
 
     name: str
@@ -172,6 +174,7 @@ class NodeNames:
         ------
         SettingsError
             If a name has characters that ROS does not allow.
+
         """
         own = name
         for rule in arguments.remaps:
@@ -209,6 +212,7 @@ class NodeNames:
         ------
         SettingsError
             If the name is no ROS name.
+
         """
         full = self._expand(name)
         for rule in self.arguments.remaps:

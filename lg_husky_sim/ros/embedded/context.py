@@ -118,6 +118,7 @@ def init(*, args: Sequence[str] | None = None, domain_id: int | None = None) -> 
         If called twice without a shutdown between.
     SettingsError
         If arguments or environment are wrong.
+
     """
     if _default:
         raise RuntimeError('init() was called before; call shutdown() first')
@@ -139,6 +140,7 @@ def default_context() -> Context:
     ------
     RuntimeError
         If there is none.
+
     """
     if not _default:
         raise RuntimeError('init() has not been called')
@@ -158,6 +160,7 @@ def shutdown() -> None:
     ------
     RuntimeError
         If :func:`init` was not called.
+
     """
     context = default_context()
     _default.clear()

@@ -41,6 +41,7 @@ def store() -> Typestore:
     ------
     MissingExtraError
         If rosbags is not installed.
+
     """
     try:
         from rosbags.interfaces import Nodetype
@@ -65,6 +66,7 @@ def type_hash(name: str) -> str:
     ----------
     name : str
         Such as ``nav_msgs/msg/Odometry``.
+
     """
     return str(store().hash_rihs01(name))
 
@@ -78,6 +80,7 @@ def register_service(name: str) -> None:
     ----------
     name : str
         A key of :data:`SERVICES`.
+
     """
     from rosbags.typesys import get_types_from_msg
     for suffix, text in zip(('Request', 'Response'), SERVICES[name], strict=True):

@@ -51,6 +51,7 @@ class Publisher:
         ------
         TypeError
             If the message or one of its fields is of another type.
+
         """
         if not isinstance(msg, self._type):
             raise TypeError(f'{self.topic_name} takes {self._type.__msgtype__}, not '
@@ -159,6 +160,8 @@ class Timer:
         period : float
             [s]
         callback : callable
+            Called without arguments.
+
         """
         self.timer_period_ns = round(period * 1e9)
         self._callback = callback

@@ -29,6 +29,7 @@ class Discovery:
         One of :data:`RANGES`.
     peers : tuple of str
         Addresses asked besides.
+
     """
 
     domain: int
@@ -45,6 +46,7 @@ class Discovery:
             What CYCLONEDDS_URI holds; it wins.
         pid : int, optional
             Process id that makes the tag of range OFF unique.
+
         """
         if self.range == 'SYSTEM_DEFAULT':
             return extra
@@ -86,6 +88,7 @@ def read_discovery(environment: Mapping[str, str]) -> Discovery:
     ------
     SettingsError
         If a variable holds what ROS 2 does not define.
+
     """
     text = environment.get('ROS_DOMAIN_ID', '').strip() or '0'
     if not (text.isascii() and text.isdigit() and int(text) <= MAX_DOMAIN):

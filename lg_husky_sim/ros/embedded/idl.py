@@ -91,6 +91,7 @@ def sample_type(name: str, *, header: bool = False) -> type[RawSample]:
         Full name of a message, or of a service's request or response.
     header : bool
         Whether the 16 bytes of rmw_cyclonedds' request identity precede the fields.
+
     """
     fields = _fields(name)
     if header:

@@ -23,6 +23,7 @@ class RcutilsLogger:
         Least level that is said.
     publish : callable
         Receives level, name and text of each line, for /rosout.
+
     """
 
     def __init__(self, name: str, level: str, publish: Callable[[int, str, str, str], None]

@@ -94,6 +94,7 @@ def message_class(name: str) -> type[Message]:
     ------
     KeyError
         If Jazzy's definitions do not hold the type.
+
     """
     types = store()
     if '/srv/' in name:
@@ -153,6 +154,7 @@ def deserialise(data: bytes, name: str) -> Message:
     ------
     rosbags.serde.SerdeError
         If the bytes do not hold such a message.
+
     """
     message_class(name)
     result = _store().deserialize_cdr(data, name)

@@ -10,6 +10,7 @@ from typing import Any
 
 from cyclonedds.core import DDSException
 from lg_husky_sim.ros.embedded.arguments import NodeNames
+from lg_husky_sim.ros.embedded.clock import Clock, Time
 from lg_husky_sim.ros.embedded.context import default_context
 from lg_husky_sim.ros.embedded.endpoints import Publisher, Service, Subscription, Timer
 from lg_husky_sim.ros.embedded.logger import RcutilsLogger
@@ -22,7 +23,6 @@ from lg_husky_sim.ros.embedded.qos import (
     qos_profile_rosout,
     QoSProfile,
 )
-from lg_husky_sim.ros.embedded.time import Clock, Time
 
 #: Peers whose services can be answered; Fast DDS peers would match and then wait for ever.
 SERVICE_RMW = 'rmw_cyclonedds_cpp'
@@ -41,6 +41,7 @@ class Node:
     ----------
     node_name : str
     namespace : str
+
     """
 
     def __init__(self, node_name: str, *, namespace: str = '') -> None:

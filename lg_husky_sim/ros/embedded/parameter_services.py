@@ -20,8 +20,10 @@ def offer_parameter_services(node: Node, store: ParameterStore) -> None:
     Parameters
     ----------
     node : Node
+        Offers them below its name.
     store : ParameterStore
         The node's parameters.
+
     """
     empty = Parameter('', ParameterType.NOT_SET, None)
 

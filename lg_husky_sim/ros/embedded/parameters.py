@@ -46,6 +46,7 @@ def parameter_type(value: object) -> ParameterType:
     ------
     TypeError
         If no parameter can hold it.
+
     """
     if value is None:
         return ParameterType.NOT_SET
@@ -138,6 +139,7 @@ class ParameterStore:
         ------
         ParameterException
             If it is declared already, or its value has the wrong type or is out of range.
+
         """
         if name in self.values:
             raise ParameterException(f'parameter {name!r} is declared already')
@@ -169,6 +171,7 @@ class ParameterStore:
         ------
         ParameterException
             If it is not declared.
+
         """
         if name not in self.values:
             raise ParameterException(f'parameter {name!r} is not declared')

@@ -47,6 +47,7 @@ class QoSProfile:
     history : HistoryPolicy
     lifespan_ns : int
         How long a sample is of use [ns]; 0 for ever.
+
     """
 
     depth: int = 10
@@ -80,10 +81,12 @@ def dds_qos(profile: QoSProfile, user_data: str, *, writer: bool) -> Qos:
     Parameters
     ----------
     profile : QoSProfile
+        As asked for.
     user_data : str
         Sent along in discovery; holds the type hash.
     writer : bool
         Whether the endpoint writes.
+
     """
     policies = [
         Policy.History.KeepLast(profile.depth),

@@ -71,6 +71,7 @@ class SingleThreadedExecutor:
         ------
         ExternalShutdownException
             If the context is shut down.
+
         """
         end = None if timeout_sec is None else time.monotonic_ns() + int(timeout_sec * 1e9)
         arrived = True

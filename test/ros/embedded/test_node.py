@@ -12,6 +12,7 @@ from typing import Any
 from cyclonedds.core import Policy, Qos
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
+from lg_husky_sim.ros.embedded.clock import Duration, Time
 from lg_husky_sim.ros.embedded.context import (
     default_context,
     ExternalShutdownException,
@@ -25,7 +26,6 @@ from lg_husky_sim.ros.embedded.node import Node
 from lg_husky_sim.ros.embedded.parameters import Parameter, parameter_type, ParameterException
 from lg_husky_sim.ros.embedded.qos import DurabilityPolicy, QoSProfile
 from lg_husky_sim.ros.embedded.spin import SingleThreadedExecutor, spin, spin_once
-from lg_husky_sim.ros.embedded.time import Duration, Time
 from lg_husky_sim.testing.live import isolated_domain
 import pytest
 

@@ -22,6 +22,7 @@ class Duration:
     ----------
     seconds, nanoseconds : float, int
         Added up.
+
     """
 
     nanoseconds: int
@@ -45,6 +46,7 @@ class Time:
     ----------
     seconds, nanoseconds : float, int
         Since the epoch of the clock, added up.
+
     """
 
     nanoseconds: int
