@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Print the closing line of ./check from pytest's JUnit report: N passed, N failed, N skipped."""
+"""Print the closing line of ./check from pytest's JUnit reports: N passed, N failed, N skipped."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import sys
 from xml.etree import ElementTree
 
 
-def closing_line(report: str, failed_steps: int) -> str:
-    """Count the tests of a JUnit report; without one, the failed steps are all there is."""
-    if not report.strip():
-        return f'0 passed, {failed_steps} failed'
-    suites = list(ElementTree.fromstring(report).iter('testsuite'))  # noqa: S314 (our own file)
+def closing_line(reports: list[Path], failed_steps: int) -> str:
+    """Count the tests of JUnit reports; without any, the failed steps are all there is."""
+    suites = [suite for report in reports
+              for suite in ElementTree.parse(report).iter('testsuite')]  # noqa: S314 (our own)
     total, bad, skipped = (
         sum(int(suite.get(key, 0)) for key in keys for suite in suites)
         for keys in (('tests',), ('failures', 'errors'), ('skipped',))
@@ -24,4 +23,4 @@ def closing_line(report: str, failed_steps: int) -> str:
 
 
 if __name__ == '__main__':
-    print(closing_line(Path(sys.argv[1]).read_text(encoding='utf-8'), int(sys.argv[2])))
+    print(closing_line(sorted(Path(sys.argv[1]).glob('*.xml')), int(sys.argv[2])))

@@ -44,10 +44,10 @@ def test_what_is_refused(text: str, message: str) -> None:
 def test_nested_aliases_are_refused_at_once() -> None:
     rows = ['a0: &a0 [x, x, x, x, x, x, x, x, x, x]']
     rows += [f'a{i}: &a{i} [{", ".join(["*a" + str(i - 1)] * 10)}]' for i in range(1, 40)]
-    start = time.monotonic()
+    start = time.process_time()
     with pytest.raises(ValueError, match='more than 100 aliases'):
         parse_yaml('\n'.join(rows))
-    assert time.monotonic() - start < 2.0
+    assert time.process_time() - start < 2.0
 
 
 def test_merge_keys_still_work() -> None:
