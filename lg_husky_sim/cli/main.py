@@ -23,6 +23,7 @@ VERBS = {
     'simulate': 'lg_husky_sim.cli.simulate',
     'drive': 'lg_husky_sim.cli.drive',
     'record': 'lg_husky_sim.cli.record',
+    'play': 'lg_husky_sim.cli.play',
     'compare': 'lg_husky_sim.cli.compare',
     'identify': 'lg_husky_sim.cli.identify',
     'evaluate': 'lg_husky_sim.cli.evaluate',

@@ -1,0 +1,80 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`lg_husky twin`: models beside a live robot, and how far each is off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+from pathlib import Path
+import time
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from lg_husky_sim.ros.twin import Twin
+
+
+@click.command(short_help='Run models beside a live robot; show how far each is off.')
+@click.option('--model', required=True, type=click.Path(path_type=Path), metavar='FILE.yaml',
+              help='Model file, such as the model.yaml of a diagnosis.')
+@click.option('--plain', type=click.Path(path_type=Path), metavar='FILE.yaml',
+              help="Model to compare with; the Husky with the paper's parameters by default.")
+@click.option('--preset', default='paper', show_default=True,
+              help='Names and types of a robot: paper, husky_ros1 or clearpath_jazzy.')
+@click.option('--seconds', type=click.FloatRange(min=0.0, min_open=True), metavar='SECONDS',
+              help='End by itself after so long; by default Ctrl-C ends it.')
+@click.option('--every', default=1.0, show_default=True, metavar='SECONDS',
+              type=click.FloatRange(min=0.05), help='Time between two lines and publications.')
+def command(model: Path, plain: Path | None, preset: str, seconds: float | None, every: float
+            ) -> None:
+    """
+    Listen to a robot's commands, joint states and IMU, and run two models beside it.
+
+    The running errors (root mean square, the last 10 s) are printed and published as
+    std_msgs/Float64 on twin/plain/wheel_rate_error, twin/model/yaw_rate_error, …; the robot may as
+    well be `lg_husky play REC` or another simulator.
+    """
+    from lg_husky_sim.husky.model import compile_model
+    from lg_husky_sim.husky.model_file import load_model
+    from lg_husky_sim.ros import api
+    from lg_husky_sim.ros.settings import make_settings
+    from lg_husky_sim.ros.twin import Twin
+
+    files = {'plain': load_model(plain), 'model': load_model(model)}
+    plants = {name: compile_model(one.structure).at(one.parameters)
+              for name, one in files.items()}
+    settings = make_settings(preset=preset)
+    api.init(args=[])
+    twin = Twin(plants, settings, _sides)
+    begun = time.monotonic()
+    try:
+        while seconds is None or time.monotonic() - begun < seconds:
+            twin.spin(every)
+            click.echo(f'{time.monotonic() - begun:7.1f} s  {_errors(twin, "now")}')
+    except KeyboardInterrupt:
+        click.echo('')
+    finally:
+        click.echo(f'  overall  {_errors(twin, "overall")}')
+        twin.close()
+        api.try_shutdown()
+
+
+def _sides(names: Sequence[str], rates: Sequence[float]) -> tuple[float, float]:
+    from lg_husky_sim.recording.wheels import side_means, wheel_sides
+    sides = wheel_sides(names, len(rates))
+    return side_means(rates, sides) if sides is not None else (math.nan, math.nan)
+
+
+def _errors(twin: Twin, which: str) -> str:
+    from lg_husky_sim.ros.twin import QUANTITIES
+    words = []
+    for quantity, unit in QUANTITIES.items():
+        before, after = (float(getattr(twin.shadows[name].errors[quantity], which))
+                         for name in ('plain', 'model'))
+        if math.isfinite(before) and math.isfinite(after):
+            change = f' ({100.0 * (after / before - 1.0):+.0f} %)' if before > 0.0 else ''
+            words.append(f'{quantity.replace("_", " ")}: plain {before:.4f}, model {after:.4f} '
+                         f'{unit}{change}')
+    return '; '.join(words) or 'nothing heard yet'

@@ -1,0 +1,118 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The twin beside a robot: its running errors tell the better model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+import subprocess
+import sys
+from typing import Any
+
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
+from lg_husky_sim.recording import Recording, write_recording
+from lg_husky_sim.signals import BodyTwist
+import pytest
+
+for needed in ('rosbags', 'cyclonedds'):
+    pytest.importorskip(needed)
+
+from lg_husky_sim.cli.twin import _sides  # noqa: E402
+from lg_husky_sim.ros.settings import make_settings  # noqa: E402
+from lg_husky_sim.ros.twin import RunningError, Shadow, Twin  # noqa: E402
+from lg_husky_sim.testing.live import probed_domain  # noqa: E402
+
+
+def test_running_error_forgets_and_the_overall_one_does_not() -> None:
+    error = RunningError(memory=1.0)
+    error.add(0.0, 3.0)
+    for moment in range(1, 101):
+        error.add(20.0 + 0.01 * moment, 1.0)
+    assert error.now == pytest.approx(1.0, abs=1e-6)
+    assert error.overall == pytest.approx(((9.0 + 100.0) / 101.0) ** 0.5)
+
+
+def test_shadow_of_the_robot_itself_has_no_error() -> None:
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    robot, shadow = Shadow(plant), Shadow(plant)
+    for one in (robot, shadow):
+        one.wheels(0.0, 0.0, 0.0)
+        one.command(0.0, BodyTwist(0.5, 0.3))
+    for step in range(1, 200):
+        moment = 0.01 * step + 1e-6
+        robot._advance(moment)
+        assert robot._state is not None
+        shadow.wheels(moment, *robot._state.wheel_rates)
+        shadow.gyro(moment, robot._state.twist.yaw)
+    assert shadow.errors['wheel_rate'].count == 398
+    assert shadow.errors['wheel_rate'].overall < 1e-9
+    assert shadow.errors['yaw_rate'].overall < 1e-9
+
+
+def test_stale_command_is_forgotten_as_the_base_does() -> None:
+    model = load_model()
+    shadow = Shadow(compile_model(model.structure).at(model.parameters), timeout=0.25)
+    shadow.wheels(0.0, 0.0, 0.0)
+    shadow.command(0.0, BodyTwist(0.5, 0.0))
+    shadow.gyro(0.2, 0.0)
+    assert shadow._state is not None
+    assert shadow._state.wheel_rates[0] > 1.0
+    shadow.gyro(0.9, 0.0)
+    assert abs(shadow._state.wheel_rates[0]) < 0.1
+
+
+@pytest.mark.parametrize(('names', 'rates', 'wanted'), [
+    (['front_left_wheel', 'front_right_wheel', 'rear_left_wheel', 'rear_right_wheel'],
+     [1.0, 2.0, 3.0, 4.0], (2.0, 3.0)),
+    (['right_wheel', 'left_wheel'], [1.0, 2.0], (2.0, 1.0)),
+])
+def test_wheels_are_found_by_name(names: list[str], rates: list[float],
+                                  wanted: tuple[float, float]) -> None:
+    assert _sides(names, rates) == wanted
+
+
+def test_live_error_drops_with_the_augmented_model(
+        drive: Callable[..., Recording], tmp_path: Path) -> None:
+    write_recording(tmp_path / 'bag', drive('any', 'rotation', 4).streams,
+                    frames=('odom', 'base_link'))
+    model = load_model()
+    (entry,) = (p for p in Effect('yaw_scrub_coulomb').parameters()
+                if p.name == 'yaw_coulomb_moment')
+    others = (p for p in Effect('yaw_scrub_coulomb').parameters()
+              if p.name != 'yaw_coulomb_moment')
+    robot = model.parameters.replacing({'wheel_damping': 1.3, 'yaw_damping': 14.0})
+    augmented = ModelFile(
+        model.structure.with_effect(Effect('yaw_scrub_coulomb')),
+        robot.with_entries(entry.parameter(4.0), *(p.parameter() for p in others)), 'augmented')
+    save_model(augmented, tmp_path / 'model.yaml')
+    read = load_model(tmp_path / 'model.yaml')
+    plants = {'plain': compile_model(model.structure).at(robot),
+              'model': compile_model(read.structure).at(read.parameters)}
+    settings = make_settings(preset='paper')
+    with probed_domain() as probe:
+        heard: dict[str, list[Any]] = {name: probe.listen(
+            'std_msgs/msg/Float64', f'twin/{name}/yaw_rate_error') for name in plants}
+        twin = Twin(plants, settings, _sides)
+        try:
+            player = subprocess.Popen(
+                [sys.executable, '-m', 'lg_husky_sim.cli.main', 'play', str(tmp_path / 'bag'),
+                 '--wait', '30'], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            try:
+                for _ in range(80):
+                    twin.spin(0.4)
+                    probe.spin(0.02)
+                    if player.poll() is not None:
+                        break
+            finally:
+                player.kill()
+                player.wait()
+            errors = {name: shadow.errors['yaw_rate'] for name, shadow in twin.shadows.items()}
+            assert errors['plain'].count > 300
+            assert errors['model'].overall < 0.7 * errors['plain'].overall
+            assert heard['plain'][-1].data > heard['model'][-1].data > 0.0
+        finally:
+            twin.close()
