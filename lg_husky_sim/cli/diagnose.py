@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""`lg_husky diagnose`: what physics does the model lack that the recordings show?"""
+"""`lg_husky diagnose`: say which physics the model lacks that the recordings show."""
 
 from __future__ import annotations
 
@@ -44,11 +44,13 @@ def command(
     from lg_husky_sim.diagnosis.output import MARKER, summary_text, write_files
     from lg_husky_sim.folders import check_folder, result_folder
     from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
+    from lg_husky_sim.identification.pages import check_extras
     from lg_husky_sim.recording import read_recording, TopicMap
     from tqdm import tqdm
 
     del seed
     check_folder(out, MARKER)
+    check_extras()
     model = apply_settings(load_model(robot), parse_settings(settings))
     choice = TopicMap.parse(topics)
     with tqdm(total=100, desc='reading', disable=None, leave=False,

@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""`lg_husky plan-drive`: which drive tells two explanations apart?"""
+"""`lg_husky plan-drive`: plan the drive that tells two explanations apart."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class Description:
     held_out: float
     energy: float
     knots: tuple[float, ...]
-    range: tuple[float, float]
+    range: tuple[float, float]  # noqa: A003
 
     @property
     def argument(self) -> str:

@@ -115,8 +115,8 @@ class _Regime:
     def at(self, values: Mapping[str, float]) -> PlantSet:
         space: StateSpace = self.numeric.at(values)
         coefficients = np.zeros((self._laws.size, WIDTH))
-        for place, number in zip(self._places, eval(self._code, dict(GLOBALS), values),  # noqa: S307
-                                 strict=True):
+        numbers = eval(self._code, dict(GLOBALS), values)  # noqa: S307 (our own expressions)
+        for place, number in zip(self._places, numbers, strict=True):
             coefficients[place] = number
         forward = space.C[2]
         rows = np.vstack([space.C, forward @ space.A, np.zeros((2, space.A.shape[0]))])
