@@ -29,12 +29,11 @@ from lg_husky_sim.diagnosis.figures_where import effort_figure, where_figure
 from lg_husky_sim.diagnosis.held_out import errors, LONGEST, plant_of
 from lg_husky_sim.diagnosis.locate import locate, Located
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Verdict
-from lg_husky_sim.extras import require
 from lg_husky_sim.husky.effects import effect_kind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.identification.pages import Picture, picture
+from lg_husky_sim.identification.pages import check_extras, Picture, picture
 from lg_husky_sim.recording import Segment, windows
 import numpy as np
 
@@ -63,19 +62,6 @@ class Change:
     after: str
     change: str
     better: bool
-
-
-def check_extras() -> None:
-    """
-    Check that pictures and page can be made.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib or jinja2 is not installed.
-    """
-    require('matplotlib', 'draw figures')
-    require('jinja2', 'write a page')
 
 
 def write_report(folder: Path, case: Case, headline: str) -> tuple[Path, ...]:

@@ -176,3 +176,13 @@ def test_other_files_are_not_overwritten(folder: Path, tmp_path: Path, capsys: A
     assert run(['diagnose', str(folder.parent / HOSTILE), '--out', str(tmp_path)]) == 1
     assert 'diagnosis.json' in capsys.readouterr().err
     assert (tmp_path / 'mine.txt').read_text() == 'keep'
+
+
+@pytest.mark.parametrize('module', ['matplotlib', 'jinja2'])
+def test_missing_extra_is_said_before_the_work(module: str, folder: Path, tmp_path: Path,
+                                               monkeypatch: Any, capsys: Any) -> None:
+    from lg_husky_sim import extras
+    monkeypatch.setattr(extras, 'find_spec', lambda name: None if name == module else object())
+    assert run(['diagnose', str(folder.parent / HOSTILE), '--out', str(tmp_path / 'out')]) == 1
+    assert f'{module} is needed to' in capsys.readouterr().err
+    assert not (tmp_path / 'out').exists()
