@@ -15,7 +15,6 @@ from lg_husky_sim.testing.live import LiveHusky, Probe
 import numpy as np
 import pytest
 
-pytest.importorskip('rosbags')
 SHORT = Manoeuvre('short', (Step(0.2, 0.0, 0.0), Step(1.2, 0.5, 0.3), Step(0.6, 0.0, 0.0)))
 
 

@@ -13,8 +13,6 @@ from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.testing.live import isolated_domain
 import pytest
 
-pytest.importorskip('rosbags')
-
 
 def test_a_node_that_dies_ends_the_demo_with_an_error(tmp_path: Path) -> None:
     """It is reported, no bag is left, and the graph is left as well."""
