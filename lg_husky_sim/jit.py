@@ -32,5 +32,5 @@ def jit(function: Function) -> Function:
     if not compiled():
         return function
     import numba
-    wrapped: Function = numba.njit(cache=True, error_model='numpy')(function)
+    wrapped: Function = numba.njit(cache=True, nogil=True, error_model='numpy')(function)
     return wrapped

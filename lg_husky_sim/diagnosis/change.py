@@ -16,7 +16,7 @@ BEFORE = 4
 
 
 def search_change(whole: Observations, baseline: Collection[str], nominal: ModelFile,
-                  progress: Progress) -> Search:
+                  progress: Progress, jobs: int = 1) -> Search:
     """
     Search for the effect that separates later recordings from earlier ones.
 
@@ -32,6 +32,8 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
         Names of the earlier recordings.
     nominal : ModelFile
     progress : callable
+    jobs : int
+        Threads to use.
 
     Returns
     -------
@@ -41,9 +43,9 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     before = whole.subset([piece.recording in baseline for piece in whole.pieces])
     known = search(before, nominal.structure, nominal.parameters,
                    lambda text, share: progress(f'before the change: {text}', 0.4 * share),
-                   most=BEFORE, onsets=False, eager=True)
+                   most=BEFORE, onsets=False, eager=True, jobs=jobs)
     first = next(piece for piece in whole.pieces if piece.recording not in baseline)
     onset = Onset(OnsetKind.TIME, first.start, first.recording)
     return search(whole, known.final.structure, nominal.parameters,
                   lambda text, share: progress(text, 0.4 + 0.5 * share),
-                  change=onset, start=known.final)
+                  change=onset, start=known.final, jobs=jobs)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis import judge
+from lg_husky_sim.diagnosis.confidence import estimates
 from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
 from lg_husky_sim.diagnosis.mismatches import mismatches
@@ -76,7 +77,7 @@ def with_intervals(case: Search, nominal: Parameters) -> tuple[Parameter, ...]:
     names = [u.name for u in final.solution.unknowns if not u.extra]
     found = []
     metric = case.rounds[-1].metric
-    for number in judge.estimates(case.observations, final, metric, names):
+    for number in estimates(case.observations, final, metric, names):
         entry = final.parameters.entry(number.name)
         source = entry.source if number.name not in nominal else (
             f'recalibrated by lg_husky diagnose; nominal {nominal[number.name]:g}')
@@ -98,6 +99,8 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         Told what is being done and how far it is (0 to 1).
     baseline : sequence of Recording
         Recordings of the same robot before a change: the question is then what changed.
+    jobs : int
+        Threads to use.
 
     Returns
     -------
@@ -115,9 +118,9 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     names = [r.name for r in recordings]
     if baseline:
         from lg_husky_sim.diagnosis.change import search_change
-        found = search_change(whole, {r.name for r in baseline}, nominal, progress)
+        found = search_change(whole, {r.name for r in baseline}, nominal, progress, jobs)
     else:
-        found = search(whole, nominal.structure, nominal.parameters, progress)
+        found = search(whole, nominal.structure, nominal.parameters, progress, jobs=jobs)
     progress('numbers', 0.9)
     own = tuple(s for s in parts if s.recording in names)
     return Case(_diagnosis(found, own, nominal, whole), found, own, nominal)
@@ -133,7 +136,9 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
     model = model_of(found.final, '; '.join(f.statement for f in names)
                      or 'recalibrated, nothing added', with_intervals(found, nominal.parameters))
     final = plant_of(found.final)
-    if not names and unnamed is not None and judge.is_unnamed(found, unnamed):
+    if judge.rolls_without_moving(whole):
+        verdict, names = Verdict.UNKNOWN, (judge.no_ground_reaction(found),)
+    elif not names and unnamed is not None and judge.is_unnamed(found, unnamed):
         verdict = Verdict.UNKNOWN
         finding, described = judge.unnamed_finding(found, unnamed)
         names = (finding,)

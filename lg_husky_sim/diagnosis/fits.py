@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.candidates import (
 from lg_husky_sim.diagnosis.screening import Signature
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.model import compile_model, Structure
-from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.identification.least_squares import Problem, Solution, solve, Unknown
 from lg_husky_sim.identification.noise import Metric, metric, robust, scales
 from lg_husky_sim.identification.problem import Observations
@@ -80,7 +80,7 @@ def fit_structure(observations: Observations, structure: Structure, nominal: Par
         None where it cannot be evaluated.
     """
     unknowns: list[Unknown] = list(nuisance(nominal, structure, observations.channels))
-    entries = []
+    entries: list[Parameter] = []
     for effect in structure.effects:
         unknowns.extend(effect_unknowns(effect, effects))
         entries.extend(effect_entries(effect, {**effects, **start}))
@@ -142,13 +142,19 @@ def recalibrate(observations: Observations, structure: Structure, nominal: Param
     sizes: Mapping[str, float] = {p: at[p] for p in at}
     start = sizes if begin is None else {**sizes, **begin.solution.values}
     predicted = observations.predict(compile_model(structure).at(at))
-    for again in (True, True, False):
-        fit = fit_structure(observations, structure, nominal,
-                            first_metric(observations, predicted), start, sizes)
-        if fit is None:
-            raise LgHuskyError('the nominal model cannot be evaluated')
-        if again:
-            predicted, start = fit.solution.predicted, fit.solution.values
+    for _ in range(2):
+        fit = _recalibrated(observations, structure, nominal, predicted, start, sizes)
+        predicted, start = fit.solution.predicted, fit.solution.values
+    return _recalibrated(observations, structure, nominal, predicted, start, sizes)
+
+
+def _recalibrated(observations: Observations, structure: Structure, nominal: Parameters,
+                  predicted: FloatArray, start: Mapping[str, float], sizes: Mapping[str, float]
+                  ) -> Fit:
+    fit = fit_structure(observations, structure, nominal,
+                        first_metric(observations, predicted), start, sizes)
+    if fit is None:
+        raise LgHuskyError('the nominal model cannot be evaluated')
     return fit
 
 

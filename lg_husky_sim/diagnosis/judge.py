@@ -17,10 +17,14 @@ from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.identification.problem import Observations
 import numpy as np
 
 #: Gain from which something is missing, whatever it is [nats].
 CERTAIN = 45.0
+#: Way per wheel angle [m/rad] below which the ground does not push the robot: a twentieth of
+#: the smallest wheel.
+NO_GRIP = 0.015
 #: A rival within this share of the winner's held-out gain, or this many nats, is as good.
 NEAR_SHARE = 0.06
 NEAR_NATS = 10.0
@@ -54,9 +58,9 @@ def is_near(rival: Rival, best: Rival) -> bool:
     return rival.held_out > best.held_out - max(NEAR_NATS, NEAR_SHARE * best.held_out)
 
 
-def _rivals(one: Round, named: Effect) -> tuple[Rivalry, ...]:
+def _rivals(one: Round, named: Effect | None) -> tuple[Rivalry, ...]:
     return tuple(Rivalry(r.effect.id, r.effect.side, r.held_out)
-                 for r in one.rivals if r.effect.id != named.id)
+                 for r in one.rivals if named is None or r.effect.id != named.id)
 
 
 def findings(search: Search) -> tuple[Finding, ...]:
@@ -145,6 +149,58 @@ def is_unnamed(search: Search, unnamed: Unnamed) -> bool:
         unnamed.held_out > CERTAIN and unnamed.share > 0.0)
 
 
+def rolls_without_moving(observations: Observations) -> bool:
+    """
+    Return whether the wheels turn and the robot does not follow.
+
+    Parameters
+    ----------
+    observations : Observations
+
+    Returns
+    -------
+    bool
+        True where the measured way is unrelated to that of the wheels at all.
+    """
+    ways: list[float] = []
+    rolled: list[float] = []
+    for piece in observations.pieces:
+        by_name = {channel.name: channel for channel in piece.channels}
+        if not {'wheel_left', 'wheel_right', 'advance'} <= set(by_name):
+            return False
+        advance = by_name['advance']
+        sides = [np.interp(advance.times, by_name[n].times, by_name[n].values)
+                 for n in ('wheel_left', 'wheel_right')]
+        ways.extend(advance.values)
+        rolled.extend(0.5 * (sides[0] + sides[1]))
+    wheel, way = np.array(rolled), np.clip(np.array(ways), -3.0, 3.0)
+    if wheel.size < 50 or float(np.std(wheel)) < 0.3:
+        return False
+    per_rate = float(wheel @ way / (wheel @ wheel))
+    return abs(per_rate) < NO_GRIP
+
+
+def no_ground_reaction(search: Search) -> Finding:
+    """
+    Return the finding for wheels that turn off the ground.
+
+    Parameters
+    ----------
+    search : Search
+
+    Returns
+    -------
+    Finding
+    """
+    first = search.rounds[0]
+    gain = max((r.held_out for r in first.rivals), default=0.0)
+    return Finding(
+        'unknown', 'both', 'traction', ('B_FL', 'B_RL', 'B_FR', 'B_RR', 'M_H', 'J_H'),
+        'whenever the wheels turn', None, (), gain, 0.0, 0.0, _rivals(first, None),
+        'There is no ground reaction: the wheels turn as commanded and the robot stays where it '
+        'is. The wheels are off the ground, or the pose is not that of this robot.')
+
+
 def description_words(description: Description) -> str:
     """Return a smooth description in words."""
     effect = description.effect
@@ -184,7 +240,8 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
         kind = effect.kind
         gain = near.held_out if near is not None else first.scores[0].gain
         words = (f'Something is missing that is not in the catalogue; the nearest entry, '
-                 f'{effect.id}, explains {100.0 * max(first.share, 0.0):.1f} % of it.')
+                 f'{effect.id}, explains {100.0 * max(first.share, 0.0):.1f} % of it, and that '
+                 'not steadily enough over held-out stretches to be its name.')
     return Finding('unknown', 'none', kind.subsystem.value, kind.elements, 'not determined',
                    None, (), gain, p_value(gain, 9, len(candidates())), unnamed.share, rivals,
                    words), best if described else None

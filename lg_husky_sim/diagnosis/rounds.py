@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.candidates import Candidate, neutral
 from lg_husky_sim.diagnosis.evidence import energy, held_out_cost, instability
 from lg_husky_sim.diagnosis.fits import at_nominal, extras_of, Fit, fit_structure, shared_metric
+from lg_husky_sim.diagnosis.onsets import Onsets
 from lg_husky_sim.diagnosis.screening import (
-    Onsets,
     Projector,
     scan,
     Score,
@@ -45,6 +46,8 @@ FURTHER_GAIN = (100.0, 0.06)
 UNSTABLE = 0.35
 #: How much more a change must explain after it than in any recording before it.
 PLACEBO = 2.0
+#: Least share of the unexplained energy that a change between recordings must explain.
+CHANGE_SHARE = 0.15
 #: What a late effect must gain more than the same one without an onset: nats and share.
 LATER = (12.0, 0.08)
 
@@ -108,7 +111,7 @@ class Round:
 
 def play_round(observations: Observations, base: Fit, nominal: Parameters,
                pool: Sequence[Candidate], masks: Sequence[Onsets], folds: FloatArray,
-               number: int, only_late: bool = False, eager: bool = False) -> Round:
+               number: int, only_late: bool = False, eager: bool = False, jobs: int = 1) -> Round:
     """
     Play one round of the search.
 
@@ -128,15 +131,20 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     eager : bool
         Whether to adopt whatever predicts held-out data better: for a good description, not for
         a name.
+    jobs : int
+        Threads for the refits; the kernel runs without the interpreter's lock.
 
     Returns
     -------
     Round
     """
     taken = {(e.id, e.side) for e in base.structure.effects}
-    signatures = [s for c in pool if (c.effect.id, c.effect.side) not in taken
-                  for s in signatures_of(c, base.structure, base.parameters, extras_of(base),
-                                         observations, base.solution.predicted)]
+    asked = [c for c in pool if (c.effect.id, c.effect.side) not in taken]
+    with ThreadPoolExecutor(jobs) as workers:
+        signatures = [s for found in workers.map(
+            lambda c: signatures_of(c, base.structure, base.parameters, extras_of(base),
+                                    observations, base.solution.predicted), asked)
+                      for s in found]
     common = shared_metric(observations, base, signatures)
     late = base.structure.onset is None or only_late
     scores = screen(observations, base, common, signatures, masks if late else ())
@@ -150,17 +158,22 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     serious += [s for s in _serious(broad, SERIOUS // 2)
                 if (s.signature.candidate.label, s.onset is None) not in chosen]
     nominal_fit = at_nominal(observations, base, nominal)
-    quick = []
-    for score in serious:
-        tries = [refit(observations, near, nominal, score, common)
-                 for near in (base, nominal_fit) if near is not None]
-        best_try = min((t for t in tries if t is not None),
-                       key=lambda t: t.solution.cost, default=None)
-        if best_try is not None:
-            quick.append((score, best_try))
-    near = sorted(quick, key=lambda pair: pair[1].solution.cost)[:POLISHED]
-    fits = [(score, refit(observations, base, nominal, score, common, 6, fit))
-            for score, fit in near]
+    starts = [near for near in (base, nominal_fit) if near is not None]
+    tasks = [(score, near) for score in serious for near in starts]
+    with ThreadPoolExecutor(jobs) as workers:
+        tried = list(workers.map(
+            lambda task: refit(observations, task[1], nominal, task[0], common), tasks))
+        quick: dict[int, Fit] = {}
+        for (score, _), fit in zip(tasks, tried, strict=True):
+            number_of = serious.index(score)
+            if fit is not None and (number_of not in quick or fit.solution.cost
+                                    < quick[number_of].solution.cost):
+                quick[number_of] = fit
+        near = sorted(quick.items(), key=lambda pair: pair[1].solution.cost)[:POLISHED]
+        polished = list(workers.map(
+            lambda pair: refit(observations, base, nominal, serious[pair[0]], common, 6,
+                               pair[1]), near))
+    fits = [(serious[k], fit) for (k, _), fit in zip(near, polished, strict=True)]
     usable = [(score, fit) for score, fit in fits if fit is not None]
     rebased = fit_structure(observations, base.structure, nominal, common,
                             base.solution.values, base.parameters) or base
@@ -230,11 +243,14 @@ def _adopts(best: Rival, share: float, unstable: float, rest: float, number: int
             change: bool) -> bool:
     late = int(best.onset is not None and not change)
     own = {p.name for p in best.effect.parameters()}
-    if any(name in own and best.fit.parameters[name] == best.fit.parameters.entry(name).lower == 0.0
+    found = best.fit.parameters
+    if any(name in own and found[name] == found.entry(name).lower == 0.0
            for name in best.fit.solution.at_bound):
         return False
     if best.held_out < LEAST_GAIN[late] or unstable > UNSTABLE:
         return False
+    if change:
+        return share > CHANGE_SHARE
     if number > 0:
         return share > FURTHER_SHARE or (
             best.held_out > FURTHER_GAIN[0] and share > FURTHER_GAIN[1] and rest < MUCH)

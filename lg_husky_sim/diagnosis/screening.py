@@ -16,8 +16,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.candidates import Candidate, effect_entries, neutral
+from lg_husky_sim.diagnosis.onsets import Onsets
 from lg_husky_sim.errors import LgHuskyError
-from lg_husky_sim.husky.effects import Onset, OnsetKind
+from lg_husky_sim.husky.effects import Onset
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
@@ -25,13 +26,6 @@ from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
-
-#: Time between two moments at which an onset is tried [s].
-ONSET_STEP = 1.5
-#: Data that must lie on either side of an onset [s].
-ONSET_MARGIN = 3.0
-#: Places at which an onset is tried.
-PLACES = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,124 +249,6 @@ class Sums:
             best = np.maximum(best, 0.0)
         gain = float(best @ target - 0.5 * best @ scaled @ best)
         return gain, tuple(float(b) for b in best / safe)
-
-
-@dataclass(frozen=True, eq=False)
-class Onsets:
-    """
-    Onsets to try, as unions of groups of values.
-
-    Parameters
-    ----------
-    groups : numpy.ndarray of int64, shape (n_values,)
-    count : int
-        Number of groups.
-    onsets : tuple of (Onset, numpy.ndarray of bool, shape (n_groups,))
-        Each with the groups that lie after it.
-    placebos : tuple of numpy.ndarray of bool, shape (n_groups,)
-        Groups in which an effect is switched on for comparison.
-    """
-
-    groups: NDArray[np.int64]
-    count: int
-    onsets: tuple[tuple[Onset, NDArray[np.bool_]], ...]
-    placebos: tuple[NDArray[np.bool_], ...] = ()
-
-
-def _places(observations: Observations) -> tuple[NDArray[np.int64], FloatArray]:
-    # Recording number and x of every value.
-    owner = np.zeros(observations.times.size, dtype=np.int64)
-    x = np.full(observations.times.size, np.nan)
-    for one in observations.slices:
-        piece = observations.pieces[one.piece]
-        owner[one.first:one.last] = observations.recordings.index(piece.recording)
-        if piece.pose is not None:
-            x[one.first:one.last] = np.interp(observations.times[one.first:one.last],
-                                              piece.pose.times, piece.pose.column('x'))
-    return owner, x
-
-
-def time_onsets(observations: Observations) -> Onsets:
-    """
-    Return onsets in time.
-
-    Parameters
-    ----------
-    observations : Observations
-
-    Returns
-    -------
-    Onsets
-        In each recording (later recordings lie after it), and at the same time in all of them.
-    """
-    owner, _ = _places(observations)
-    times = observations.times
-    cells = np.maximum(0, np.floor(times / ONSET_STEP).astype(np.int64))
-    width = int(cells.max(initial=0)) + 1
-    names = observations.recordings
-    number = np.repeat(np.arange(len(names)), width)
-    begins = np.tile(np.arange(width) * ONSET_STEP, len(names))
-    found: list[tuple[Onset, NDArray[np.bool_]]] = []
-    ends = [times[owner == i].max() for i in range(len(names))]
-    for i, name in enumerate(names):
-        for moment in begins[:width]:
-            if ONSET_MARGIN <= moment <= ends[i] - ONSET_MARGIN or (i > 0 and moment == 0.0):
-                found.append((Onset(OnsetKind.TIME, float(moment), name),
-                              (number > i) | ((number == i) & (begins >= moment))))
-    if len(names) > 1:
-        for moment in begins[:width]:
-            if ONSET_MARGIN <= moment <= min(ends) - ONSET_MARGIN:
-                found.append((Onset(OnsetKind.TIME, float(moment)), begins >= moment))
-    return Onsets(owner * width + cells, width * len(names), tuple(found))
-
-
-def one_onset(observations: Observations, onset: Onset) -> Onsets:
-    """
-    Return a single onset: everything from a recording on.
-
-    Parameters
-    ----------
-    observations : Observations
-    onset : Onset
-        In time, in a named recording.
-
-    Returns
-    -------
-    Onsets
-    """
-    owner, _ = _places(observations)
-    number = observations.recordings.index(onset.recording)
-    cells = np.arange(len(observations.recordings))
-    return Onsets(owner, cells.size, ((onset, cells >= number),),
-                  tuple(cells == i for i in range(number)))
-
-
-def place_onsets(observations: Observations) -> Onsets:
-    """
-    Return onsets along x, from above and from below.
-
-    Parameters
-    ----------
-    observations : Observations
-
-    Returns
-    -------
-    Onsets
-        Empty where there is no pose, or it does not move by a metre.
-    """
-    _, x = _places(observations)
-    known = x[np.isfinite(x)]
-    edges = np.linspace(*np.quantile(known, [0.1, 0.9]), PLACES) if known.size else np.zeros(0)
-    if edges.size == 0 or edges[-1] - edges[0] < 1.0:
-        return Onsets(np.zeros(x.size, dtype=np.int64), 1, ())
-    groups = np.where(np.isfinite(x), np.searchsorted(edges, x, side='right'), PLACES + 1)
-    found: list[tuple[Onset, NDArray[np.bool_]]] = []
-    cells = np.arange(PLACES + 2)
-    for i, edge in enumerate(edges):
-        above = (cells >= i + 1) & (cells <= PLACES)
-        found.append((Onset(OnsetKind.PLACE_ABOVE, float(edge)), above))
-        found.append((Onset(OnsetKind.PLACE_BELOW, float(edge)), cells <= i))
-    return Onsets(groups, PLACES + 2, tuple(found))
 
 
 def scan(projector: Projector, signatures: Sequence[Signature],

@@ -18,9 +18,9 @@ from dataclasses import dataclass, field, replace
 from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.evidence import folds_of
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate
-from lg_husky_sim.diagnosis.onset import refined_onset
+from lg_husky_sim.diagnosis.onset_placing import refined_onset
+from lg_husky_sim.diagnosis.onsets import one_onset, Onsets, place_onsets, time_onsets
 from lg_husky_sim.diagnosis.rounds import LEAST_GAIN, play_round, Round
-from lg_husky_sim.diagnosis.screening import one_onset, Onsets, place_onsets, time_onsets
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.parameters import Parameters
@@ -66,7 +66,8 @@ def _silent(text: str, share: float) -> None:
 
 def search(observations: Observations, structure: Structure, nominal: Parameters,
            progress: Progress = _silent, most: int = MOST, onsets: bool = True,
-           change: Onset | None = None, start: Fit | None = None, eager: bool = False) -> Search:
+           change: Onset | None = None, start: Fit | None = None, eager: bool = False,
+           jobs: int = 1) -> Search:
     """
     Search the catalogue.
 
@@ -88,6 +89,8 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         A fit of the structure to some of the data, to begin from.
     eager : bool
         Whether a good description is wanted rather than a name.
+    jobs : int
+        Threads to use.
 
     Returns
     -------
@@ -105,7 +108,7 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
     for number in range(most + 1):
         progress(f'round {number + 1}: signatures and refits', number / (most + 1))
         one = play_round(observations, base, nominal, pool, masks, folds, number,
-                         only_late=change is not None, eager=eager)
+                         only_late=change is not None, eager=eager, jobs=jobs)
         rounds.append(one)
         if not one.adopted or number == most:
             break

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.fits import extras_of, Fit
-from lg_husky_sim.diagnosis.screening import ONSET_STEP, place_onsets, time_onsets
+from lg_husky_sim.diagnosis.onsets import ONSET_STEP, place_onsets, time_onsets
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
