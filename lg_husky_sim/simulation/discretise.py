@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import itertools
 import math
 
+from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import OnsetKind
 from lg_husky_sim.husky.laws import WIDTH
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet
@@ -119,8 +120,11 @@ def _nodes(plant: PlantSet, a: FloatArray, b: FloatArray, g: FloatArray, step: f
 
 
 def _stage(command: CommandStage, period: float) -> list[float]:
-    latency = min(command.latency / period, DELAY - 2.0)
-    return [latency, command.slew_forward * period, command.slew_yaw * period,
+    longest = (DELAY - 2) * period
+    if command.latency > longest * (1.0 + 1e-9):
+        raise ParameterError(f'latency = {command.latency:g} s is longer than {longest:g} s, '
+                             f'what steps of period {period:g} s can hold back')
+    return [command.latency / period, command.slew_forward * period, command.slew_yaw * period,
             command.limit_forward, command.limit_yaw, command.volts_per_speed,
             -command.volts_per_rate, command.volts_per_speed, command.volts_per_rate,
             command.clamp]
@@ -147,6 +151,11 @@ def discretise(plant: Plant, period: float, *, fine_pose: bool = True) -> Operat
     Returns
     -------
     Operators
+
+    Raises
+    ------
+    ParameterError
+        If the command's latency is longer than :data:`kernel.DELAY` - 2 periods.
     """
     efforts = max(s.laws.size for s in plant.sets)
     arguments = max(s.h.shape[0] for s in plant.sets)

@@ -219,16 +219,21 @@ class Simulator:
         Returns
         -------
         SimulatorState
-            Where the number of states differs, wheel rates, velocity, angles and pose are kept
-            and the others start as in :meth:`initial`.
+            Where the number of states differs, wheel rates, velocity, currents, angles and pose
+            are kept, and the others (front axles, a controller's states) are those of the steady
+            drive that comes nearest.
         """
-        if state.n == self.operators.n:
+        n = self.operators.n
+        if state.n == n:
             return state
-        fresh = self.initial(state.pose, state.twist, state.time, state.wheel_rates,
-                             state.wheel_angles)
-        flat = np.array(fresh.flat)
-        flat[fresh.n:] = state.flat[state.n:]
-        return _state(flat, np.array(state.row), fresh.n)
+        one = self.plant.sets[0]
+        steady = np.linalg.lstsq(-one.a, one.b, rcond=None)[0]
+        drive = np.linalg.lstsq(one.rows[:4] @ steady, state.row[:4], rcond=None)[0]
+        nearest = steady @ drive
+        flat = np.concatenate([nearest, state.flat[state.n:]])
+        flat[:n] += np.linalg.lstsq(one.rows[:6], state.row[:6] - one.rows[:6] @ nearest,
+                                    rcond=None)[0]
+        return _state(flat, np.array(state.row), n)
 
 
 def _state(flat: FloatArray, row: FloatArray, n: int) -> SimulatorState:
