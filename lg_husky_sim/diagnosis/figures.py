@@ -13,6 +13,7 @@ from lg_husky_sim.diagnosis.diagnose import Case
 from lg_husky_sim.diagnosis.fits import extras_of
 from lg_husky_sim.diagnosis.locate import Located
 from lg_husky_sim.diagnosis.result import Estimate, Verdict
+from lg_husky_sim.diagnosis.rounds import Round
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.identification.problem import Observations, Slice, UNITS
 from lg_husky_sim.linear_graph import LinearGraph
@@ -136,7 +137,7 @@ def before_after_figure(case: Case, located: Located) -> Figure:
             for axes in (upper, lower):
                 axes.axvline(onset.value, color='#d40000', linewidth=1.2, linestyle='--',
                              label='onset')
-        upper.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncol=4, borderaxespad=0.2)
+        figure.legend(*upper.get_legend_handles_labels(), loc='outside lower center', ncol=4)
     return figure
 
 
@@ -164,34 +165,44 @@ def rivals_figure(case: Case) -> Figure | None:
     rounds = [one for one in case.search.rounds if one.rivals]
     if not rounds:
         return None
+    columns = min(len(rounds), 2)
+    rows = -(-len(rounds) // columns)
     most = max(len(one.rivals) for one in rounds)
     with rc_context({**STYLE, 'axes.grid': False}):
-        figure = Figure(figsize=(9.0, 1.2 + 0.32 * most), layout='constrained')
-        for axes, (number, one) in zip(figure.subplots(1, len(rounds), squeeze=False)[0],
-                                       enumerate(rounds), strict=True):
-            names, gains = [], []
-            for rival in one.rivals:
-                side = '' if rival.effect.side in ('none', 'both') else f', {rival.effect.side}'
-                onset = '' if rival.onset is None else ' (late)'
-                names.append(f'{rival.effect.id}{side}{onset}')
-                gains.append(rival.held_out)
-            chosen = [one.adopted and i == 0 for i in range(len(gains))]
-            axes.barh(range(len(gains)), gains,
-                      color=[AUGMENTED if on else '#b8c0cc' for on in chosen])
-            span = max(max(gains, default=1.0), 1.0) - min(min(gains, default=0.0), 0.0)
-            for row, gain in enumerate(gains):
-                axes.text(max(gain, 0.0) + 0.02 * span, row, f'{gain:.0f}', va='center',
-                          fontsize=8.0)
-            axes.set_yticks(range(len(gains)), names)
-            for label, on in zip(axes.get_yticklabels(), chosen, strict=True):
-                label.set_fontweight('bold' if on else 'normal')
-            axes.invert_yaxis()
-            axes.margins(x=0.14)
-            axes.axvline(0.0, color=GREY, linewidth=0.8)
-            axes.set_xlabel('held-out gain [nats]')
+        figure = Figure(figsize=(9.0, rows * (1.2 + 0.32 * most)), layout='constrained')
+        grid = figure.subplots(rows, columns, squeeze=False).flat
+        for axes in grid[len(rounds):]:
+            axes.set_axis_off()
+        for axes, (number, one) in zip(grid, enumerate(rounds), strict=False):
+            _draw_round(axes, one)
             axes.set_title(f'Round {number + 1}: '
                            + ('adopted' if one.adopted else 'nothing adopted'))
     return figure
+
+
+def _draw_round(axes: Axes, one: Round) -> None:
+    names = []
+    for rival in one.rivals:
+        parts = [p for p in (rival.effect.side, rival.effect.shape)
+                 if p not in ('', 'none', 'both')]
+        names.append(', '.join([rival.effect.id, *parts])
+                     + ('' if rival.onset is None else ' (late)'))
+    gains = [rival.held_out for rival in one.rivals]
+    chosen = [one.adopted and i == 0 for i in range(len(gains))]
+    top = max(*gains, 1.0)
+    floor = -0.3 * top  # a much worse one would hide the others
+    axes.barh(range(len(gains)), [max(gain, floor) for gain in gains],
+              color=[AUGMENTED if on else '#b8c0cc' for on in chosen])
+    for row, gain in enumerate(gains):
+        axes.text(max(gain, 0.0) + 0.02 * top, row, f'{gain:.0f}', va='center', fontsize=8.0)
+    axes.set_yticks(range(len(gains)), names)
+    for label, on in zip(axes.get_yticklabels(), chosen, strict=True):
+        label.set_fontweight('bold' if on else 'normal')
+    axes.invert_yaxis()
+    axes.set_xlim(floor if min(gains) < 0.0 else 0.0, 1.25 * top)
+    axes.locator_params(axis='x', nbins=4)
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.set_xlabel('held-out gain [nats]')
 
 
 def intervals_figure(case: Case) -> Figure | None:

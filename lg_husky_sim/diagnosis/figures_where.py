@@ -52,6 +52,9 @@ def where_figure(located: Located, culprits: Collection[str], onset: Onset | Non
     pieces, strengths = _shown(located), located.strengths
     grids = [cells(located, piece) for piece in pieces]
     top = max(max(float(values.max()) for _, values in grids), 50.0 * FAINT)
+    total = sum(float(edges[-1] - edges[0]) for edges, _ in grids)
+    names: list[str] = []
+    recordings = {located.observations.pieces[located.bins[i].piece].recording for i in pieces}
     with rc_context({**STYLE, 'axes.grid': False}):
         figure = Figure(figsize=(9.6, 4.3), layout='constrained')
         axes = figure.subplots(2, len(pieces), squeeze=False, height_ratios=(3.2, 1.0),
@@ -73,18 +76,23 @@ def where_figure(located: Located, culprits: Collection[str], onset: Onset | Non
                 label.set_color('#d40000' if named else '#333333')
             upper.tick_params(length=0)
             name = located.observations.pieces[located.bins[piece].piece].recording
-            most = max(6, round(70 / len(pieces)))
-            upper.set_title((name if len(name) <= most else name[:most - 1] + '…').replace(
-                '$', r'\$'), fontsize=9.0)
+            if not column or name != names[-1]:
+                most = max(6, round(70 / len(recordings)))
+                upper.set_title((name if len(name) <= most else name[:most - 1] + '…').replace(
+                    '$', r'\$'), fontsize=9.0)
+            names.append(name)
+            narrow = float(edges[-1] - edges[0]) < 0.15 * total
+            lower.locator_params(axis='x', nbins=2 if narrow else 4)
             _commands(lower, located, piece, edges, column == 0)
             if onset is not None and onset.kind.value == 'time' and (
                     onset.recording in ('', name)):
                 for each in (upper, lower):
                     each.axvline(onset.value, color='#0072b2', linewidth=1.5, linestyle='--')
+        figure.supxlabel('time [s]', fontsize=9.0)
         bar = figure.colorbar(image, ax=axes[0, :], pad=0.01)
         bar.set_label('explained [nats/s]')
         handles, labels = axes[1, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc='outside lower right', ncol=2)
+        figure.legend(handles, labels, loc='outside lower center', ncol=2)
     return figure
 
 
@@ -95,7 +103,6 @@ def _commands(axes: Any, located: Located, piece: int, edges: Any, first: bool) 
         axes.step(commands.times, commands.column(column), where='post', color=colour,
                   linewidth=1.1, label=words)
     axes.set_xlim(edges[0], edges[-1])
-    axes.set_xlabel('time [s]')
     if first:
         axes.set_ylabel('command')
 
@@ -154,7 +161,8 @@ def effort_figure(located: Located) -> Figure | None:
             right.set_title(f'explains {100.0 * max(mark.share, 0.0):.0f} %',
                             fontweight='normal', fontsize=9.0)
         name = located.observations.pieces[located.bins[piece].piece].recording
-        axes[0, 0].set_title(f'{located.families[best].name}, '.capitalize()
-                             + name[:40].replace('$', r'\$'))
+        title = f'{located.families[best].name.capitalize()}, {name}'
+        axes[0, 0].set_title((title if len(title) <= 58 else title[:57] + '…').replace(
+            '$', r'\$'))
         axes[-1, 0].set_xlabel('time [s]')
     return figure
