@@ -67,7 +67,7 @@ def verb_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 @pytest.mark.parametrize(('how', 'code', 'said'), [
     ('ours', 1, 'error: mass = -1 kg is below its lower bound 0\n'),
-    ('file', 1, "error: [Errno 2] No such file or directory: '/nonexistent/file'\n"),
+    ('file', 1, 'error: /nonexistent/file: No such file or directory\n'),
     ('interrupt', 130, 'interrupted\n'),
     ('well', 0, ''),
 ])

@@ -117,8 +117,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
         # The reader (head, less) has left; keep the interpreter from flushing into nothing.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (LgHuskyError, OSError) as error:
+    except LgHuskyError as error:
         return fail(f'error: {error}')
+    except OSError as error:
+        named = error.filename is not None and error.strerror
+        return fail(f'error: {error.filename}: {error.strerror}' if named else f'error: {error}')
     return code if isinstance(code, int) else 0
 
 
