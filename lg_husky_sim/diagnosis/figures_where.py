@@ -81,14 +81,16 @@ def where_figure(located: Located, culprits: Collection[str], onset: Onset | Non
                 upper.set_title((name if len(name) <= most else name[:most - 1] + '…').replace(
                     '$', r'\$'), fontsize=9.0)
             names.append(name)
-            narrow = float(edges[-1] - edges[0]) < 0.15 * total
-            lower.locator_params(axis='x', nbins=2 if narrow else 4)
+            share = float(edges[-1] - edges[0]) / total
+            lower.locator_params(axis='x', nbins=2 if share < 0.2 else 4)
+            if share < 0.12:
+                lower.set_xticks([round(0.5 * float(edges[0] + edges[-1]))])
             _commands(lower, located, piece, edges, column == 0)
             if onset is not None and onset.kind.value == 'time' and (
                     onset.recording in ('', name)):
                 for each in (upper, lower):
                     each.axvline(onset.value, color='#0072b2', linewidth=1.5, linestyle='--')
-        figure.supxlabel('time [s]', fontsize=9.0)
+        axes[1, (len(pieces) - 1) // 2].set_xlabel('time [s]')
         bar = figure.colorbar(image, ax=axes[0, :], pad=0.01)
         bar.set_label('explained [nats/s]')
         handles, labels = axes[1, 0].get_legend_handles_labels()
