@@ -72,6 +72,13 @@ def main(args: Sequence[str] | None = None) -> int:
 def _run(args: Sequence[str] | None) -> int:
     started = time.monotonic()
     from lg_husky_sim.errors import LgHuskyError
+    from lg_husky_sim.ros.usage import asked_for_help, usage
+    words = list(sys.argv if args is None else args)
+    if asked_for_help(words[1:]):
+        # A pager that is left early is no error.
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+        print(usage())
+        return 0
     try:
         from lg_husky_sim.ros import api
         from lg_husky_sim.ros.simulation_node import SimNode
@@ -82,7 +89,7 @@ def _run(args: Sequence[str] | None) -> int:
     joined, code = False, 0
     _on_signals(_interrupt)
     try:
-        api.init(args=list(sys.argv if args is None else args))
+        api.init(args=words)
         joined = True
         node = SimNode(NAME, started=started)
         # What is loaded now stays: the garbage collector need not look through it at each turn,
