@@ -18,6 +18,7 @@ from lg_husky_sim.simulation import rollout, Simulator
 from lg_husky_sim.simulation.kernel import COLUMNS
 from lg_husky_sim.simulation.simulator import hold
 import numpy as np
+from numpy.typing import ArrayLike
 import pytest
 
 Maker = Callable[..., Plant]
@@ -33,8 +34,8 @@ def wandering(count: int, seed: int = 0) -> FloatArray:
     return np.repeat(few, 10, axis=0)[:count]
 
 
-def series(times: FloatArray, values: FloatArray) -> TimeSeries:
-    return TimeSeries(times, values, ('forward', 'yaw'))
+def series(times: ArrayLike, values: FloatArray) -> TimeSeries:
+    return TimeSeries(np.asarray(times, dtype=np.float64), values, ('forward', 'yaw'))
 
 
 @pytest.mark.parametrize('effects', [(), ('speed_loop',), MANY])
