@@ -10,19 +10,19 @@ import subprocess
 import sys
 from typing import Any
 
+from lg_husky_sim.cli.twin import _sides
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
 from lg_husky_sim.recording import Recording, write_recording
+from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.signals import BodyTwist
 import pytest
 
 for needed in ('rosbags', 'cyclonedds'):
     pytest.importorskip(needed)
 
-from lg_husky_sim.cli.twin import _sides  # noqa: E402
-from lg_husky_sim.ros.settings import make_settings  # noqa: E402
-from lg_husky_sim.ros.twin import RunningError, Shadow, Twin  # noqa: E402
+from lg_husky_sim.ros.twin import RunningError, Shadow, Twin  # noqa: E402, I100
 from lg_husky_sim.testing.live import probed_domain  # noqa: E402
 
 
