@@ -67,7 +67,8 @@ def main() -> None:
     for side, name in enumerate(('left', 'right')):
         scale = float(truth[:, side] @ guess[:, side] / max(guess[:, side] @ guess[:, side], 1e-9))
         alike = np.corrcoef(truth[:, side], guess[:, side])[0, 1]
-        print(f'{name:6} current: correlation {alike:.2f}, predicted mean {guess[:, side].mean():.2f} A, '
+        print(f'{name:6} current: correlation {alike:.2f}, '
+              f'predicted mean {guess[:, side].mean():.2f} A, '
               f'recorded {truth[:, side].mean():.2f} A, best factor on the prediction {scale:.2f}')
     apart = np.abs(truth[:, 0] - truth[:, 1]) > 1.0
     for regime in ('turning', 'straight'):
