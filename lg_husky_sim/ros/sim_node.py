@@ -22,23 +22,11 @@ if TYPE_CHECKING:
 NAME = 'sim_node'
 
 
-class Interrupted(BaseException):
-    """
-    A signal asks the node to end while it starts.
-
-    Not KeyboardInterrupt: where that passes through an ``exec`` of text, as many imports do one,
-    CPython ends the process by SIGINT although the exception is caught.
-    """
-
-
 def _leave(number: int, frame: FrameType | None) -> None:
-    # Nothing is open yet. An exception would not do: an extension module turns it into an
-    # ImportError while it is being loaded.
+    # Nothing is open yet. An exception would not do: an extension module that is being loaded
+    # turns it into an ImportError, and CPython ends by the signal where a KeyboardInterrupt has
+    # passed through an exec of text, as many imports do one.
     os._exit(0)
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise Interrupted
 
 
 def _on_signals(handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
@@ -63,10 +51,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     # Imports take most of the start; a signal during them ends the process cleanly as well.
     _on_signals(_leave)
-    try:
-        return _run(args)
-    except (KeyboardInterrupt, Interrupted):
-        return 0
+    return _run(args)
 
 
 def _run(args: Sequence[str] | None) -> int:
@@ -87,7 +72,10 @@ def _run(args: Sequence[str] | None) -> int:
         return 1
     node: Any = None
     joined, code = False, 0
-    _on_signals(_interrupt)
+    # From here on the middleware's own handlers shut the graph down, which ends spinning. What
+    # comes before they are there is kept in mind.
+    asked: list[int] = []
+    _on_signals(lambda number, frame: asked.append(number))
     try:
         api.init(args=words)
         joined = True
@@ -95,8 +83,9 @@ def _run(args: Sequence[str] | None) -> int:
         # What is loaded now stays: the garbage collector need not look through it at each turn,
         # which would make steps late.
         gc.freeze()
-        api.spin(node)
-    except (KeyboardInterrupt, Interrupted, api.ExternalShutdownException):
+        if not asked:
+            api.spin(node)
+    except (KeyboardInterrupt, api.ExternalShutdownException):
         code = 0
     except Exception as error:
         # A signal takes the node out of the graph while it is still being put together; what
