@@ -287,8 +287,11 @@ def named_drive(effects: Sequence[str], structure: Structure, parameters: Parame
     Returns
     -------
     str
-        Empty where no drive decides.
+        Empty where no drive decides, or one of the two cannot be put into the model.
     """
-    one, two = (typical(name, structure, parameters) for name in effects[:2])
-    best = plan(one, two, drives(speed, rate))[0]
+    try:
+        one, two = (typical(name, structure, parameters) for name in effects[:2])
+        best = plan(one, two, drives(speed, rate))[0]
+    except LgHuskyError:
+        return ''
     return best.manoeuvre.about if best.nats > DECISIVE else ''

@@ -28,6 +28,7 @@ from lg_husky_sim.diagnosis.figures import (
 from lg_husky_sim.diagnosis.figures_where import effort_figure, where_figure
 from lg_husky_sim.diagnosis.held_out import errors, LONGEST, plant_of
 from lg_husky_sim.diagnosis.locate import locate, Located
+from lg_husky_sim.diagnosis.planning import named_drive
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Verdict
 from lg_husky_sim.husky.effects import effect_kind
 from lg_husky_sim.husky.model import compile_model
@@ -267,7 +268,7 @@ def page(case: Case, located: Located, pictures: Mapping[str, Picture], headline
             {'name': name, 'before': f'{before:.4g}', 'after': f'{after:.4g}',
              'change': f'{change:+.0f} % ({low:+.0f} to {high:+.0f})', 'better': high < 0.0}
             for name, before, after, change, low, high in per_channel],
-        groups=diagnosis.indistinguishable, mismatch=diagnosis.mismatch[:MOST],
+        groups=_groups(case), mismatch=diagnosis.mismatch[:MOST],
         left_out=max(0, len(diagnosis.mismatch) - MOST),
         parts=[(name, f'{100.0 * share:.0f} %') for name, share in located.strengths.items()]
         if located.certain else [],
@@ -276,6 +277,15 @@ def page(case: Case, located: Located, pictures: Mapping[str, Picture], headline
         changed=labels_of(case)[0] != labels_of(case)[1], terms=new_terms(case),
         remaining=diagnosis.remaining, notes=diagnosis.notes,
         recordings=_recordings(case.segments))
+
+
+def _groups(case: Case) -> list[dict[str, Any]]:
+    # What cannot be told apart; for the first group, the drive that would, computed.
+    plain = case.diagnosis.plain_model
+    return [{'effects': one.effects, 'sensors': one.sensors, 'manoeuvres': one.manoeuvres,
+             'drive': named_drive(one.effects, plain.structure, plain.parameters)
+             if place == 0 else ''}
+            for place, one in enumerate(case.diagnosis.indistinguishable)]
 
 
 def _finding(finding: Finding) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lg_husky_sim.cli.main import run
-from lg_husky_sim.diagnosis.planning import drives, imitated, plan, typical
+from lg_husky_sim.diagnosis.planning import drives, imitated, named_drive, plan, typical
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.manoeuvres import load_manoeuvre
 import numpy as np
@@ -40,6 +40,14 @@ def test_an_explanation_imitates_itself() -> None:
     one = typical('rolling_resistance', model.structure, model.parameters)
     (manoeuvre,) = (m for m in drives(0.8, 0.8) if m.name == 'two_speeds')
     assert imitated(one, one, manoeuvre)[0] < 0.5
+
+
+def test_drive_is_named_in_words_where_one_decides() -> None:
+    model = load_model()
+    pair = ('gyro_bias', 'wheel_radius_mismatch')
+    assert named_drive(pair, model.structure, model.parameters) == (
+        'a long straight run, both ways')
+    assert named_drive(('slope', 'slope'), model.structure, model.parameters) == ''
 
 
 def test_command_writes_a_script_that_can_be_driven(tmp_path: Path, capsys: Any) -> None:
