@@ -7,11 +7,13 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 package_name = 'lg_husky_sim'
+# colcon build --symlink-install runs a link to this file in another folder.
+ROOT = Path(__file__).resolve().parent
 
 # Folders beside the package that it reads at run time. They travel inside the wheel (and are found
 # there by lg_husky_sim/resources.py) and, as ROS users expect, in share/ too.
-DATA_FOLDERS = [folder for folder in ('config', 'urdf') if Path(folder).is_dir()]
-SHARE_FOLDERS = [*DATA_FOLDERS, *(folder for folder in ('launch',) if Path(folder).is_dir())]
+DATA_FOLDERS = [folder for folder in ('config', 'urdf') if (ROOT / folder).is_dir()]
+SHARE_FOLDERS = [*DATA_FOLDERS, *(folder for folder in ('launch',) if (ROOT / folder).is_dir())]
 
 EXTRAS = {
     'fast': ['numba>=0.59'],
@@ -53,8 +55,9 @@ EXTRAS['check'] = [*EXTRAS['all'], *EXTRAS['dev']]
 def files_of(folder):
     """Return one data_files row for each folder below (and with) the given one."""
     rows = {}
-    for path in sorted(Path(folder).rglob('*')):
+    for path in sorted((ROOT / folder).rglob('*')):
         if path.is_file() and '__pycache__' not in path.parts:
+            path = path.relative_to(ROOT)
             rows.setdefault(f'share/{package_name}/{path.parent.as_posix()}', []).append(
                 path.as_posix())
     return list(rows.items())
@@ -64,7 +67,7 @@ setup(
     name=package_name,
     version='0.1.0',
     description='Live digital twin of the Clearpath Husky, derived from a linear graph',
-    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description=(ROOT / 'README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',
     author='lg_husky_sim contributors',
     maintainer='lg_husky_sim contributors',

@@ -95,16 +95,22 @@ def test_installed_package_finds_its_own_files_away_from_the_source(
     assert found.read_bytes() == (ROOT / 'config' / 'husky.yaml').read_bytes()
 
 
-def arguments_of_setup() -> dict[str, object]:
-    """Run setup.py with a recorder in setup()'s place."""
-    ask = ('import json, setuptools\n'
+def arguments_of_setup(folder: Path = ROOT) -> dict[str, object]:
+    """Run setup.py of a folder with a recorder in setup()'s place."""
+    ask = ('import json, runpy, setuptools\n'
            'setuptools.setup = lambda **kw: print(json.dumps(kw))\n'
-           'exec(compile(open("setup.py").read(), "setup.py", "exec"))')
-    done = subprocess.run([sys.executable, '-c', ask], cwd=ROOT, text=True,
+           'runpy.run_path("setup.py")')
+    done = subprocess.run([sys.executable, '-c', ask], cwd=folder, text=True,
                           capture_output=True, timeout=60, check=True)
     arguments = json.loads(done.stdout)
     assert isinstance(arguments, dict)
     return arguments
+
+
+def test_setup_runs_as_a_link_in_another_folder(tmp_path: Path) -> None:
+    """As colcon build --symlink-install runs it."""
+    (tmp_path / 'setup.py').symlink_to(ROOT / 'setup.py')
+    assert arguments_of_setup(tmp_path) == arguments_of_setup()
 
 
 def test_package_xml_says_what_setup_says() -> None:
