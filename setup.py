@@ -75,7 +75,7 @@ setup(
     license='Apache-2.0',
     python_requires='>=3.11',
     packages=[
-        *find_packages(exclude=['test', 'test.*', 'benchmarks', 'benchmarks.*']),
+        *sorted(find_packages(include=['lg_husky_sim', 'lg_husky_sim.*'])),
         *(f'{package_name}.{folder}' for folder in DATA_FOLDERS),
     ],
     package_dir={f'{package_name}.{folder}': folder for folder in DATA_FOLDERS},

@@ -109,8 +109,11 @@ def arguments_of_setup(folder: Path = ROOT) -> dict[str, object]:
 
 def test_setup_runs_as_a_link_in_another_folder(tmp_path: Path) -> None:
     """As colcon build --symlink-install runs it."""
-    (tmp_path / 'setup.py').symlink_to(ROOT / 'setup.py')
-    assert arguments_of_setup(tmp_path) == arguments_of_setup()
+    for name in ('setup.py', 'lg_husky_sim'):
+        (tmp_path / name).symlink_to(ROOT / name)
+    linked, direct = arguments_of_setup(tmp_path), arguments_of_setup()
+    assert linked == direct
+    assert 'lg_husky_sim.ros' in str(linked['packages'])
 
 
 def test_package_xml_says_what_setup_says() -> None:
