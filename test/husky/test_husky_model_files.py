@@ -1,0 +1,189 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Model files: what is written is read back; what is wrong is one line that names it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from lg_husky_sim.errors import ModelFileError
+from lg_husky_sim.husky.effects import catalogue, descriptions, Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model import compile_model, Structure
+from lg_husky_sim.husky.model_file import load_model, model_data, ModelFile, save_model
+import numpy as np
+import pytest
+import yaml
+
+EFFECTS = [Effect(kind.id, kind.sides[-1], kind.shapes[-1])
+           for kind in (*catalogue().values(), *descriptions().values())]
+
+
+def with_effects(*effects: Effect, onset: Onset | None = None) -> ModelFile:
+    nominal, structure = load_model(), Structure(onset=onset)
+    for effect in effects:
+        structure = structure.with_effect(effect)
+    own = [dataclasses.replace(p.parameter(), low=p.lower, high=p.upper)
+           for e in effects for p in e.parameters() if p.name not in nominal.parameters]
+    return ModelFile(structure, nominal.parameters.with_entries(*own), 'made by a test · ω')
+
+
+def test_the_packaged_file_is_the_nominal_robot() -> None:
+    model = load_model()
+    assert model.structure == Structure()
+    assert 'paper' in model.about
+
+
+@pytest.mark.parametrize('effect', EFFECTS, ids=lambda e: e.id)
+def test_round_trip_of_each_effect(tmp_path: Path, effect: Effect) -> None:
+    model = with_effects(effect)
+    save_model(model, tmp_path / 'deep' / 'model.yaml')
+    again = load_model(tmp_path / 'deep' / 'model.yaml')
+    assert again == model
+    for one, other in zip(compile_model(model.structure).at(model.parameters).sets,
+                          compile_model(again.structure).at(again.parameters).sets, strict=True):
+        np.testing.assert_array_equal(one.a, other.a)
+        np.testing.assert_array_equal(one.coefficients, other.coefficients)
+        assert one.command == other.command
+        assert one.sensors == other.sensors
+    assert [p.name for p in (tmp_path / 'deep').iterdir()] == ['model.yaml']
+
+
+@pytest.mark.parametrize('kind', OnsetKind)
+def test_round_trip_of_late_effects(tmp_path: Path, kind: OnsetKind) -> None:
+    onset = Onset(kind, 31.25, 'rec2' if kind is OnsetKind.TIME else '')
+    model = with_effects(Effect('terrain_change', late=True), Effect('payload'),
+                         Effect('yaw_pull', late=True), onset=onset)
+    save_model(model, tmp_path / 'model.yaml')
+    assert load_model(tmp_path / 'model.yaml') == model
+
+
+def test_every_bit_of_a_number_comes_back(tmp_path: Path) -> None:
+    nominal = load_model()
+    value = 48.39 * (1.0 + 2.0 ** -52) + 1e-13
+    model = ModelFile(nominal.structure, nominal.parameters.replacing({'mass': value}))
+    save_model(model, tmp_path / 'model.yaml')
+    assert load_model(tmp_path / 'model.yaml').parameters['mass'] == value
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path,
+                                            monkeypatch: pytest.MonkeyPatch) -> None:
+    place = tmp_path / 'model.yaml'
+    place.write_text('the old one')
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError('no space')
+    monkeypatch.setattr(yaml, 'safe_dump', fail)
+    with pytest.raises(OSError, match='no space'):
+        save_model(load_model(), place)
+    assert place.read_text() == 'the old one'
+    assert list(tmp_path.iterdir()) == [place]
+
+
+def mass(key: str, value: object) -> Callable[[dict[str, Any]], None]:
+    def change(data: dict[str, Any]) -> None:
+        data['parameters']['mass'][key] = value
+    return change
+
+
+def put(key: str, value: object) -> Callable[[dict[str, Any]], None]:
+    def change(data: dict[str, Any]) -> None:
+        data[key] = value
+    return change
+
+
+def without(key: str) -> Callable[[dict[str, Any]], None]:
+    def change(data: dict[str, Any]) -> None:
+        del data['parameters'][key]
+    return change
+
+
+SLOPED = [{'effect': 'slope', 'parameters': {'slope_x': 3.0}}]
+HOSTILE: list[tuple[Callable[[dict[str, Any]], None], str]] = [
+    (put('schema', 'another/1'), "schema is 'another/1', expected 'lg_husky_sim/model/1'"),
+    (put('schema', None), 'schema is None, expected'),
+    (put('colour', 'red'), "unknown key 'colour'"),
+    (put('parameters', [1, 2]), 'parameters is not a mapping of names'),
+    (put('parameters', None), 'parameters is not a mapping of names'),
+    (put('structure', 'expanded'), 'structure is not a mapping of names'),
+    (put('structure', {'drivetrain': 'tracks'}), "structure.drivetrain = 'tracks' is not one of "
+                                                 'simplified, expanded'),
+    (put('structure', {'onset': {'kind': 'mood', 'value': 1.0}}),
+     "structure.onset.kind = 'mood' is not one of time, place_above, place_below"),
+    (put('structure', {'onset': {'kind': 'time', 'value': 'noon'}}),
+     "structure.onset: value = 'noon' is not a number"),
+    (mass('value', 'heavy'), "mass: value = 'heavy' is not a number"),
+    (mass('value', True), 'mass: value = True is not a number'),
+    (mass('value', float('nan')), 'mass: value = nan is not finite'),
+    (mass('value', 10 ** 400), 'is not finite'),
+    (mass('value', -3.0), 'mass = -3 kg is below its lower bound 1'),
+    (mass('lower', None), 'mass: lower = None is not a number'),
+    (mass('free', 'maybe'), "parameter mass: free = 'maybe' is neither true nor false"),
+    (mass('weight', 1.0), "parameter mass: unknown key 'weight'"),
+    (without('mass'), 'parameter mass is missing'),
+    (put('effects', {'slope': 1}), 'effects is not a list'),
+    (put('effects', ['slope']), 'effect 1 is not a mapping of names'),
+    (put('effects', [{'effect': 'slop'}]), "unknown effect 'slop'; did you mean slope?"),
+    (put('effects', [{'effect': 'encoder_scale', 'side': 'top'}]),
+     "side 'top' of effect encoder_scale is not one of left, right"),
+    (put('effects', [{'effect': 'slope', 'parameters': {'steep': 1.0}}]),
+     "effect slope: unknown parameter 'steep'"),
+    (put('effects', [{'effect': 'slope', 'parameters': {'slope_x': 1e6}}]),
+     'slope_x = 1e+06 N is above its upper bound 400'),
+    (put('effects', [{'effect': 'slope', 'late': True}]),
+     'effect slope is late, but there is no onset'),
+    (put('effects', [{'effect': 'slope', 'late': 'soon'}]),
+     "effect 1: late = 'soon' is neither true nor false"),
+]
+
+
+@pytest.mark.parametrize(('change', 'message'), HOSTILE, ids=range(len(HOSTILE)))
+def test_what_is_wrong_is_one_line(tmp_path: Path, change: Callable[[dict[str, Any]], None],
+                                   message: str) -> None:
+    data = model_data(load_model())
+    change(data)
+    place = tmp_path / 'model.yaml'
+    place.write_text(yaml.safe_dump(data))
+    with pytest.raises(ModelFileError) as caught:
+        load_model(place)
+    text = str(caught.value)
+    assert text.startswith(f'{place}: ')
+    assert message in text
+    assert '\n' not in text
+
+
+@pytest.mark.parametrize('content', [
+    b'', b'- a list', b'just words', b'\xff\xfe\x00garbage', b'a: [1, 2', b'{a: 1, a: 2}: 3',
+    b'!!python/object/apply:os.system ["touch hacked"]', b'a: &x [*x]',
+    b'a: &a [1]\nb: &b [*a, *a]\n',
+])
+def test_what_is_no_model_is_refused_in_one_line(
+        tmp_path: Path, content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    place = tmp_path / 'model.yaml'
+    place.write_bytes(content)
+    with pytest.raises(ModelFileError) as caught:
+        load_model(place)
+    assert str(place) in str(caught.value)
+    assert '\n' not in str(caught.value)
+    assert not (tmp_path / 'hacked').exists()
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ModelFileError, match=r'nowhere\.yaml'):
+        load_model(tmp_path / 'nowhere.yaml')
+    with pytest.raises(ModelFileError):
+        load_model(tmp_path)
+
+
+def test_short_forms_take_the_catalogues_defaults(tmp_path: Path) -> None:
+    data = model_data(load_model())
+    data['effects'] = SLOPED
+    (tmp_path / 'model.yaml').write_text(yaml.safe_dump(data))
+    model = load_model(tmp_path / 'model.yaml')
+    assert model.structure.effects == (Effect('slope'),)
+    assert model.parameters['slope_x'] == 3.0
+    assert model.parameters['slope_y'] == 8.0
+    assert model.parameters.entry('slope_x').unit == 'N'
