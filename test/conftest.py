@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A maker of robots with effects, for every folder of tests."""
+"""Robots with effects for every folder of tests, and the mark of those that look at the clock."""
 
 from __future__ import annotations
 
@@ -11,6 +11,20 @@ from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
 import pytest
+
+REALTIME = {
+    'test_contract_live.py', 'test_contract_node.py', 'test_contract_process.py',
+    'test_contract_standard.py', 'test_graph_numeric.py',
+}
+"""Files whose tests measure time or talk to live processes: a busy machine would fail them."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give the tests of those files the marker realtime; ./check runs them by themselves."""
+    for item in items:
+        if item.path.name in REALTIME:
+            item.add_marker(pytest.mark.realtime)
 
 
 def _robot(*effects: str | Effect, onset: Onset | None = None, **values: float) -> Plant:

@@ -129,7 +129,10 @@ def test_ctrl_c_ends_a_running_verb_with_130(verb_from: str, tmp_path: Path) -> 
     (tmp_path / 'lg_husky_test_verb.py').write_text(
         'import click, time\n\n@click.command()\ndef command():\n'
         '    print("running", flush=True)\n    time.sleep(60)\n')
-    start = ('from lg_husky_sim.cli import main\n'
+    # A shell's background jobs, such as CI's, are born deaf to SIGINT.
+    start = ('import signal\n'
+             'signal.signal(signal.SIGINT, signal.default_int_handler)\n'
+             'from lg_husky_sim.cli import main\n'
              'main.VERBS["act"] = "lg_husky_test_verb"\nmain.main()')
     with subprocess.Popen([sys.executable, '-c', start, verb_from], text=True,
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE,
