@@ -71,6 +71,15 @@ def model_of(fit: Fit, about: str, intervals: Sequence[Parameter] = ()) -> Model
     return ModelFile(fit.structure, fit.parameters.with_entries(*intervals), about)
 
 
+def ordered(fit: Fit, names: Sequence[str]) -> Fit:
+    """Return a fit whose onset says which of the recordings are earlier than its own."""
+    onset = fit.structure.onset
+    if onset is None or onset.recording not in names:
+        return fit
+    earlier = tuple(names[:names.index(onset.recording)])
+    return replace(fit, structure=replace(fit.structure, onset=replace(onset, earlier=earlier)))
+
+
 def with_intervals(case: Search, nominal: Parameters) -> tuple[Parameter, ...]:
     """Return the final fit's parameters with their 95 % intervals."""
     final = case.final
@@ -121,6 +130,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         found = search_change(whole, {r.name for r in baseline}, nominal, progress, jobs)
     else:
         found = search(whole, nominal.structure, nominal.parameters, progress, jobs=jobs)
+    found = replace(found, final=ordered(found.final, whole.recordings))
     progress('numbers', 0.9)
     own = tuple(s for s in parts if s.recording in names)
     return Case(_diagnosis(found, own, nominal, whole), found, own, nominal)

@@ -50,11 +50,14 @@ class Onset:
     recording : str
         Name of the recording in which a time onset lies: the effect is absent in earlier ones
         and stays in later ones. Empty where it begins at that time in each.
+    earlier : tuple of str
+        Names of the recordings that are known to be earlier.
     """
 
     kind: OnsetKind
     value: float
     recording: str = ''
+    earlier: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

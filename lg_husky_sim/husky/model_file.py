@@ -125,9 +125,12 @@ def _onset(data: object) -> Onset | None:
     if entry.get('kind') not in kinds:
         raise ModelFileError(
             f'structure.onset.kind = {shown(entry.get("kind"))} is not one of {", ".join(kinds)}')
+    earlier = entry.get('earlier') or []
+    if not isinstance(earlier, list) or not all(isinstance(name, str) for name in earlier):
+        raise ModelFileError('structure.onset.earlier is not a list of names of recordings')
     return Onset(OnsetKind(entry['kind']), _number('structure.onset', 'value',
                                                    entry.get('value')),
-                 str(entry.get('recording', '')))
+                 str(entry.get('recording', '')), tuple(earlier))
 
 
 def model_from_data(data: object, name: str) -> ModelFile:
@@ -266,6 +269,8 @@ def model_data(model: ModelFile) -> dict[str, object]:
     if onset is not None:
         structure['onset'] = {'kind': onset.kind.value, 'value': onset.value,
                               'recording': onset.recording}
+        if onset.earlier:
+            structure['onset']['earlier'] = list(onset.earlier)  # type: ignore[index]
     of_effects = {p.name for e in model.structure.effects for p in e.parameters()}
     shared = packaged_parameters()
     return {

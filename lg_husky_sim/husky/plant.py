@@ -141,7 +141,7 @@ class Plant:
         name : str
             Name of the recording.
         earlier : collection of str
-            Names of the recordings made before that of the onset.
+            Names of further recordings made before that of the onset.
 
         Returns
         -------
@@ -151,7 +151,7 @@ class Plant:
         onset = self.onset
         if onset is None or len(self.sets) < 2 or onset.recording in ('', name):
             return self
-        return Plant((self.sets[0 if name in earlier else 1],), self.states)
+        return Plant((self.sets[0 if name in (*earlier, *onset.earlier) else 1],), self.states)
 
     def observe(self, truth: TimeSeries) -> TimeSeries:
         """

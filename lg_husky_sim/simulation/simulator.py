@@ -130,7 +130,7 @@ class Simulator:
         Returns
         -------
         SimulatorState
-            Other states (currents, controllers) are the least that agree with these outputs.
+            Other states (currents, controllers) are those of the nearest steady drive.
         """
         pose, twist = pose or Pose(), twist or BodyTwist()
         one = self.plant.sets[0]
@@ -140,7 +140,12 @@ class Simulator:
             wheel_rates = self._rolling(twist)
         wanted = np.array([*(wheel_rates or (0.0, 0.0)), twist.forward, twist.yaw])
         if np.any(wanted):
-            flat[:n] = np.linalg.lstsq(one.rows[:4], wanted, rcond=None)[0]
+            # The nearest steady drive, so that controllers and belts start where they would be,
+            # and the least change that makes it agree with what is wanted.
+            steady = np.linalg.lstsq(-one.a, one.b, rcond=None)[0]
+            nearest = steady @ np.linalg.lstsq(one.rows[:4] @ steady, wanted, rcond=None)[0]
+            flat[:n] = nearest + np.linalg.lstsq(
+                one.rows[:4], wanted - one.rows[:4] @ nearest, rcond=None)[0]
         flat[n:n + 2] = wheel_angles
         flat[n + 3:n + 7] = pose.heading, pose.x, pose.y, time
         row = np.zeros(len(COLUMNS))
