@@ -49,7 +49,7 @@ PLACEBO = 2.0
 #: Least share of the unexplained energy that a change between recordings must explain.
 CHANGE_SHARE = 0.15
 #: What a late effect must gain more than the same one without an onset: nats and share.
-LATER = (12.0, 0.08)
+LATER = (12.0, 0.15)
 
 
 @dataclass(frozen=True, eq=False)

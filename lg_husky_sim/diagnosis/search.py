@@ -179,4 +179,4 @@ def with_better_onset(observations: Observations, fit: Fit, nominal: Parameters,
     sizes = {**fit.parameters, **fit.solution.values}
     again = fit_structure(observations, replace(fit.structure, onset=onset), nominal, metric_,
                           fit.solution.values, sizes, 3)
-    return fit if again is None or again.solution.cost > fit.solution.cost + 1.0 else again
+    return fit if again is None else again
