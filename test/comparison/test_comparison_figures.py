@@ -39,7 +39,7 @@ def test_responses_and_trajectory(
     for axes in figure.axes:
         measured, predicted = axes.get_lines()
         assert (measured.get_label(), predicted.get_label()) == ('measured', 'paper')
-        assert np.nanmax(predicted.get_xdata()) <= 10.0
+        assert np.nanmax(np.asarray(predicted.get_xdata(), dtype=float)) <= 10.0
     assert 'a drive – first 10 s of 27 s' in [text.get_text() for text in figure.texts]
     tracks = {'paper': tracking(segment, prediction['paper'])}
     figure = trajectory_figure(segment, tracks, styles, 'a drive')
