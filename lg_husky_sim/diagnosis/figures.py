@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.result import Estimate, Verdict
 from lg_husky_sim.diagnosis.rounds import Round
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.identification.problem import Observations, Slice, UNITS
-from lg_husky_sim.linear_graph import LinearGraph
+from lg_husky_sim.linear_graph import Branch, LinearGraph
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -271,12 +271,16 @@ def new_elements(plain: Structure, final: Structure) -> tuple[LinearGraph, tuple
 
 def _drawn(graph: LinearGraph, added: Sequence[str]) -> tuple[LinearGraph, tuple[str, ...]]:
     # New branches under names that are short enough to be drawn: T_new_L, E_new_1.
-    fresh = []
+    fresh: list[Branch] = []
     for branch in graph.branches:
         if branch.name in added:
             graph = graph.without(branch.name)
             end = branch.name.rsplit('_', 1)[-1]
             short = f'{branch.name[0]}_new' + (f'_{end}' if len(end) <= 2 else '')
+            taken = {*graph.names, *(other.name for other in fresh)}
+            if short in taken:
+                short = next(f'{short}_{n}' for n in range(2, len(taken) + 3)
+                             if f'{short}_{n}' not in taken)
             fresh.append(replace(branch, name=short))
     return graph.with_branches(*fresh), tuple(branch.name for branch in fresh)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 import json
 import multiprocessing
 from pathlib import Path
@@ -21,6 +21,12 @@ from lg_husky_sim.proof import bags, measures, plain
 from lg_husky_sim.proof.cases import generate, Spec
 from lg_husky_sim.proof.scoring import judge, Judgement
 from lg_husky_sim.proof.sealing import unseal, write_json
+
+TRIES = 5
+"""Draws of one robot before a seed is given up."""
+
+REDRAWN = 1_000_003
+"""Distance between the seeds of two draws."""
 
 TIME_LIMIT = 900.0
 Progress = Callable[[str], None]
@@ -83,7 +89,15 @@ def keep_plan(folders: Folders, specs: Sequence[Spec]) -> None:
 
 
 def _generate(spec: Spec, name: str, folders: Folders) -> tuple[str, str]:
-    return name, generate(spec, name, folders.cases, folders.answers, folders.held_out)
+    for again in range(TRIES):
+        try:
+            return name, generate(replace(spec, seed=spec.seed + again * REDRAWN), name,
+                                  folders.cases, folders.answers, folders.held_out)
+        except FloatingPointError:
+            # This draw drives the robot out of its bounds: take the next, the same for everyone.
+            for place in (folders.cases, folders.held_out):
+                shutil.rmtree(place / name, ignore_errors=True)
+    raise CommandError(f'seed {spec.seed} gives no robot that stays in its bounds')
 
 
 def prepare(folders: Folders, specs: Sequence[Spec], jobs: int,
