@@ -242,10 +242,9 @@ def _rank(rival: Rival) -> float:
 def _adopts(best: Rival, share: float, unstable: float, rest: float, number: int,
             change: bool) -> bool:
     late = int(best.onset is not None and not change)
-    own = {p.name for p in best.effect.parameters()}
     found = best.fit.parameters
-    if any(name in own and found[name] == found.entry(name).lower == 0.0
-           for name in best.fit.solution.at_bound):
+    if all(found[p.name] == found.entry(p.name).lower == 0.0
+           for p in best.effect.parameters() if not p.fixed):
         return False
     if best.held_out < LEAST_GAIN[late] or unstable > UNSTABLE:
         return False
