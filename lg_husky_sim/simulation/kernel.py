@@ -37,6 +37,11 @@ import numpy as np
 COLUMNS = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate', 'current_left', 'current_right',
            'accel_x', 'angle_left', 'angle_right', 'distance', 'heading', 'x', 'y',
            'voltage_left', 'voltage_right')
+#: Taylor coefficients of cosine and sine: factors, since divisions would cost most of a step.
+C_2, C_4, C_6 = -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0
+C_8, C_10, C_12 = 1.0 / 40320.0, -1.0 / 3628800.0, 1.0 / 479001600.0
+S_3, S_5, S_7 = -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0
+S_9, S_11, S_13 = 1.0 / 362880.0, -1.0 / 39916800.0, 1.0 / 6227020800.0
 #: Steps that the delay line can hold back.
 DELAY = 128
 #: Numbers of the command stage: latency [steps], slew forward and yaw [per step],
@@ -101,10 +106,10 @@ def _pose(s: FloatArray, n: int, start: FloatArray, end: FloatArray, nodes: Floa
             angle = nodes[count + k] - heading
             q = angle * angle
             if q < 0.25:
-                cosine = 1.0 - q / 2.0 * (1.0 - q / 12.0 * (1.0 - q / 30.0 * (
-                    1.0 - q / 56.0 * (1.0 - q / 90.0 * (1.0 - q / 132.0)))))
-                sine = angle * (1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (
-                    1.0 - q / 72.0 * (1.0 - q / 110.0 * (1.0 - q / 156.0))))))
+                cosine = 1.0 + q * (C_2 + q * (C_4 + q * (C_6 + q * (C_8 + q * (
+                    C_10 + q * C_12)))))
+                sine = angle * (1.0 + q * (S_3 + q * (S_5 + q * (S_7 + q * (S_9 + q * (
+                    S_11 + q * S_13))))))
             else:
                 cosine, sine = math.cos(angle), math.sin(angle)
             way = weights[k] * nodes[k]
