@@ -101,8 +101,7 @@ def _cut(segment: Segment, start: float, end: float) -> Segment:
     return near
 
 
-def refitted(fit: Fit, nominal: Parameters, train: Observations, whole: Observations,
-             metric: Metric) -> Fit:
+def refitted(fit: Fit, nominal: Parameters, train: Observations, metric: Metric) -> Fit:
     """
     Refit a structure to some of the data.
 
@@ -111,16 +110,16 @@ def refitted(fit: Fit, nominal: Parameters, train: Observations, whole: Observat
     fit : Fit
         On all data.
     nominal : Parameters
-    train, whole : Observations
-        What to fit now, and what the metric belongs to.
+    train : Observations
+        What to fit now.
     metric : Metric
+        Of all data: its correlations are kept.
 
     Returns
     -------
     Fit
         The given one where the refit cannot be evaluated.
     """
-    del whole
     white = first_metric(train, train.predict(plant_of(fit)))
     weighted = replace(white, filters=metric.filters)
     sizes = {**fit.parameters, **fit.solution.values}
@@ -130,8 +129,7 @@ def refitted(fit: Fit, nominal: Parameters, train: Observations, whole: Observat
 
 
 def held_out_errors(plain: Fit, final: Fit, nominal: Parameters, segments: Sequence[Segment],
-                    whole: Observations, metric: Metric
-                    ) -> tuple[dict[str, float], dict[str, float]]:
+                    metric: Metric) -> tuple[dict[str, float], dict[str, float]]:
     """
     Return the errors of both models on data that neither was fitted to.
 
@@ -141,7 +139,6 @@ def held_out_errors(plain: Fit, final: Fit, nominal: Parameters, segments: Seque
         Recalibrated only, and with what was found.
     nominal : Parameters
     segments : sequence of Segment
-    whole : Observations
     metric : Metric
 
     Returns
@@ -155,6 +152,6 @@ def held_out_errors(plain: Fit, final: Fit, nominal: Parameters, segments: Seque
     if not train or not test:
         return {}, {}
     some = observations(train)
-    pair = [errors(plant_of(refitted(fit, nominal, some, whole, metric)), test)
+    pair = [errors(plant_of(refitted(fit, nominal, some, metric)), test)
             for fit in (plain, final)]
     return pair[0], pair[1]

@@ -100,21 +100,19 @@ def findings(search: Search) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-def indistinguishable(search: Search, nominal: Parameters) -> tuple[Indistinguishable, ...]:
+def indistinguishable(search: Search) -> tuple[Indistinguishable, ...]:
     """
     Return the sets of effects between which the data do not decide.
 
     Parameters
     ----------
     search : Search
-    nominal : Parameters
 
     Returns
     -------
     tuple of Indistinguishable
         A set for each adopted effect with rivals that explain held-out data about as well.
     """
-    del nominal
     found = []
     for one in (r for r in search.rounds if r.adopted):
         best = one.rivals[0]
