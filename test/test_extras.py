@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -14,6 +16,9 @@ from lg_husky_sim.extras import EXTRA_OF, require
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+#: What package.xml brings and pip does not.
+ROS = set(re.findall(r'<exec_depend>(\w+)</exec_depend>',
+                     (ROOT / 'package.xml').read_text(encoding='utf-8')))
 WITHOUT = 'import sys\nsys.modules.update(dict.fromkeys({names}))\n'
 
 
@@ -33,6 +38,26 @@ def test_each_module_belongs_to_an_extra_that_setup_offers() -> None:
     setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
     for module, extra in EXTRA_OF.items():
         assert f"'{extra}': [" in setup, module
+
+
+def test_each_import_is_required_or_belongs_to_an_extra() -> None:
+    setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
+    required = set(re.findall(r"'([a-z]+)[>=<,.0-9]*'", setup.split('install_requires')[1]))
+    # pytest itself loads the one module that needs it, the plugin with the fixtures.
+    known = {'yaml', 'lg_husky_sim', 'pytest', *required, *EXTRA_OF, *ROS,
+             *sys.stdlib_module_names}
+    found = set()
+    for path in (ROOT / 'lg_husky_sim').rglob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+            if isinstance(node, ast.Import):
+                found |= {name.name.split('.')[0] for name in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                found.add(node.module.split('.')[0])
+    assert found - known == set()
+    # An extra that nothing imports is no extra, and each brings what it is named for.
+    assert set(EXTRA_OF) - found <= {'dask'}
+    for module, extra in EXTRA_OF.items():
+        assert module == 'distributed' or module in setup.split(f"'{extra}': [")[1].split(']')[0]
 
 
 def modules_below(part: str) -> list[str]:

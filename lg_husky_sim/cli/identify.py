@@ -30,7 +30,8 @@ import click
                    'differential evolution, on the position alone (eq. 23).')
 @click.option('--nuisance', multiple=True, metavar='NAMES',
               help='Unknowns of the recordings to estimate as well, separated by commas: '
-                   'latency, delay_wheels, delay_imu, delay_pose, gyro_bias.')
+                   'latency, delay_wheels, delay_imu, delay_pose, gyro_bias; and initial_state, '
+                   'the state at the start of every segment that begins in motion.')
 @click.option('--profile', multiple=True, metavar='NAMES',
               help='Parameters to give a likelihood profile, separated by commas: intervals '
                    'that hold for bent likelihoods too, at the price of more simulations.')

@@ -43,6 +43,7 @@ class Confidence:
     Parameters
     ----------
     unknowns : tuple of Unknown
+        Those that all pieces share; the others follow them.
     covariance, correlation : numpy.ndarray, shape (n_unknowns, n_unknowns)
         Of the varied quantities.
     condition : float
@@ -53,6 +54,10 @@ class Confidence:
         95 % intervals of the values.
     inflation : numpy.ndarray, shape (n_unknowns,)
         Variance over that of white residuals of unit size.
+    local : tuple of Unknown
+        Corrections of the starts of single pieces.
+    local_deviations : numpy.ndarray, shape (n_local,)
+        Their standard deviations.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -63,6 +68,8 @@ class Confidence:
     low: FloatArray
     high: FloatArray
     inflation: FloatArray
+    local: tuple[Unknown, ...]
+    local_deviations: FloatArray
 
     @property
     def deviations(self) -> FloatArray:
@@ -102,13 +109,16 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
         Variances are the larger of the curvature's and of the sandwich's, the latter widened by
         Student's t, so that few blocks do not feign accuracy.
     """
-    observations, metric = problem.observations, problem.metric
+    observations, metric, layout = problem.observations, problem.metric, problem.layout
     white = metric.whiten(observations, observations.measured - solution.predicted)
-    slope = metric.whiten(observations, solution.jacobian)
-    count = slope.shape[1]
+    packed = metric.whiten(observations, solution.jacobian)
     priors = np.array([0.0 if np.isinf(u.deviation) else u.deviation ** -2
                        for u in solution.unknowns])
-    curvature = slope.T @ slope + np.diag(priors)
+    # Starts of single pieces follow the unknowns that all share, and cost them certainty.
+    curvature, slope, follow, alone = layout.eliminate(
+        layout.gram(packed) + np.diag(priors), packed)
+    count = slope.shape[1]
+    unknowns = tuple(solution.unknowns[i] for i in layout.shared)
     size = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
     shape = curvature / np.outer(size, size)
     eigenvalues = np.linalg.eigvalsh(shape) if count else np.ones(1)
@@ -128,12 +138,14 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     covariance = plain * np.outer(lift, lift)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     reach = normal * deviations
-    varied = [u.varied(solution.values[u.name]) for u in solution.unknowns]
-    low = [u.value(v - r) for u, v, r in zip(solution.unknowns, varied, reach, strict=True)]
-    high = [u.value(v + r) for u, v, r in zip(solution.unknowns, varied, reach, strict=True)]
-    return Confidence(solution.unknowns, covariance, covariance / np.outer(
+    varied = [u.varied(solution.values[u.name]) for u in unknowns]
+    low = [u.value(v - r) for u, v, r in zip(unknowns, varied, reach, strict=True)]
+    high = [u.value(v + r) for u, v, r in zip(unknowns, varied, reach, strict=True)]
+    local = np.sqrt(alone * level + np.einsum('pij,jk,pik->pi', follow, covariance, follow))
+    return Confidence(unknowns, covariance, covariance / np.outer(
         deviations, deviations), condition, blocks, np.array(low), np.array(high),
-        variances / np.maximum(np.diag(bread), 1e-300))
+        variances / np.maximum(np.diag(bread), 1e-300),
+        tuple(solution.unknowns[i] for i in layout.own.ravel()), local.ravel())
 
 
 def separators(names: Sequence[str]) -> str:

@@ -30,6 +30,11 @@ from lg_husky_sim.identification.search import (
     Objective,
     SearchResult,
 )
+from lg_husky_sim.identification.start_states import (
+    settle_of,
+    start_states,
+    start_warnings,
+)
 from lg_husky_sim.identification.tracking import TrackingObjective
 from lg_husky_sim.identification.unknowns import (
     free_names,
@@ -71,7 +76,8 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
         Parameters to estimate; those marked free in the model and all of its effects' if empty.
     nuisance : sequence of str
         Unknowns of the recordings, for least squares: latency, delay_wheels, delay_imu,
-        delay_pose [s], gyro_bias [rad/s].
+        delay_pose [s], gyro_bias [rad/s]; and initial_state, the state at the start of every
+        segment that begins in motion, whose first values are then used as well.
     profiles : sequence of str
         Estimated parameters that get a likelihood profile.
     seed : int
@@ -103,10 +109,10 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
     """
     names = free_names(model, free)
     began = time.perf_counter()
-    used = data or observations(segments)
+    used = data or observations(segments, settle_of(model.structure, nuisance))
     tell = progress or (lambda word: None)
     if method is Method.LEAST_SQUARES:
-        unknowns = unknowns_of(model, names, nuisance)
+        unknowns = unknowns_of(model, names, nuisance, used)
         ends = best_solution(used, model, unknowns, seed, starts, jobs, scheduler, tell)
         problem, solution, evaluations = refine(used, model, unknowns, ends.values, tell)
         return _result(model, baseline or model, segments, method, seed, problem, solution,
@@ -140,7 +146,9 @@ def _result(model: ModelFile, baseline: ModelFile, segments: Sequence[Segment], 
     drawn = tuple(_profile(problem, solution, sure, name, tell) for name in profiles)
     estimates = tuple(
         _estimated(u, solution.values[u.name], float(low), float(high), model.parameters)
-        for u, low, high in zip(solution.unknowns, sure.low, sure.high, strict=True))
+        for u, low, high in zip(sure.unknowns, sure.low, sure.high, strict=True))
+    states = start_states(problem.observations, sure.local,
+                          [solution.values[u.name] for u in sure.local], sure.local_deviations)
     of_model = [one for one in estimates if not one.nuisance]
     fitted = ModelFile(model.structure, model.parameters.with_entries(*(
         replace(model.parameters.entry(one.name), value=one.value, low=one.low, high=one.high,
@@ -148,23 +156,27 @@ def _result(model: ModelFile, baseline: ModelFile, segments: Sequence[Segment], 
         for one in of_model)), f'{model.about}; estimated by {method.value}'.lstrip('; '))
     values = np.array([one.value for one in estimates])
     warnings = (*_warnings(solution, estimates, sure, ends, search, model),
-                *_left_over(problem, solution))
+                *start_warnings(states), *_left_over(problem, solution))
     cost = solution.cost if search is None else search.cost
     converged = (solution.converged if search is None else search.converged)
     starts = () if ends is None else tuple(
-        Start(dict(end.values), end.cost, end.converged) for end in ends.all)
+        Start({u.name: end.values[u.name] for u in sure.unknowns}, end.cost, end.converged)
+        for end in ends.all)
     history = np.zeros((0, 2)) if search is None else np.column_stack([search.best, search.mean])
     return FitResult(
         method, seed, fitted, _recordings(segments), estimates, sure.correlation,
         sure.covariance, sure.condition, cost, evaluations, time.perf_counter() - began,
         channel_fits(problem.observations, segments, baseline, fitted, solution),
-        starts, history, undetermined(sure, values), warnings, converged, drawn)
+        starts, history, undetermined(sure, values), warnings, converged, drawn, states)
 
 
 def _profile(problem: Problem, solution: Solution, sure: Confidence, name: str,
              tell: Callable[[str], None]) -> Profile:
     names = [u.name for u in sure.unknowns]
-    place = names.index(name) if name in names else 0
+    if name not in names:
+        raise FitError(f'no profile of {name!r}: it was not estimated '
+                       f'(estimated: {", ".join(names)})')
+    place = names.index(name)
     return profile(problem, solution, name, float(sure.deviations[place]),
                    float(sure.inflation[place]), lambda: tell(f'profile of {name}'))
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from lg_husky_sim.errors import ParameterError
@@ -13,10 +13,12 @@ from lg_husky_sim.husky.effects import EffectParameter
 from lg_husky_sim.husky.model import HuskyModel
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.identification.layout import Layout
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class Unknown:
         For the differences of the Jacobian, in the varied quantity.
     extra : bool
         Whether it belongs to the observation instead of the model.
+    local : tuple of int, optional
+        For a correction of the start of one piece: the piece's number, and which correction.
     """
 
     name: str
@@ -49,6 +53,7 @@ class Unknown:
     upper: float
     step: float
     extra: bool = False
+    local: tuple[int, int] | None = None
 
     def varied(self, value: float) -> float:
         """Return the varied quantity of a value."""
@@ -89,8 +94,9 @@ class Solution:
     values : mapping of str to float
         Estimates by name.
     predicted : numpy.ndarray, shape (n_values,)
-    jacobian : numpy.ndarray, shape (n_values, n_unknowns)
-        Derivatives of the prediction by the varied quantities, not whitened.
+    jacobian : numpy.ndarray, shape (n_values, n_columns)
+        Derivatives of the prediction by the varied quantities, not whitened; a column for each
+        unknown, those of single pieces packed as :class:`Layout` says.
     cost : float
         Half the sum of squares, priors included [nats].
     data_cost : float
@@ -110,6 +116,15 @@ class Solution:
     steps: int
     converged: bool
     at_bound: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Simulated:
+    # What was simulated last: of which parameters and latency, and from which starts.
+    key: tuple[float, ...]
+    plant: Plant
+    starts: FloatArray | None
+    grids: tuple[FloatArray, ...]
 
 
 class Problem:
@@ -133,7 +148,8 @@ class Problem:
         self.parameters = parameters
         self.metric = metric
         self.unknowns = tuple(unknowns)
-        self._simulated: tuple[tuple[float, ...], Plant, tuple[FloatArray, ...]] | None = None
+        self.layout = Layout(observations, self.unknowns)
+        self._simulated: _Simulated | None = None
 
     def predict(self, varied: FloatArray) -> FloatArray | None:
         """Return the prediction, or None where the model cannot be evaluated there."""
@@ -142,13 +158,21 @@ class Problem:
         inner = {u.name: values[u.name] for u in self.unknowns if not u.extra}
         latency = extra.get('latency', 0.0)
         key = (*inner.values(), latency)
-        if self._simulated is None or self._simulated[0] != key:
+        starts = self.observations.corrections(extra)
+        kept = self._simulated if self._simulated and self._simulated.key == key else None
+        if kept is None:
             try:
                 plant = self.model.at(self.parameters.replacing(inner))
             except (ParameterError, ArithmeticError, np.linalg.LinAlgError):
                 return None
-            self._simulated = (key, plant, self.observations.simulate(plant, latency))
-        predicted = self.observations.observe(self._simulated[1], self._simulated[2], extra)
+            self._simulated = _Simulated(
+                key, plant, starts, self.observations.simulate(plant, latency, starts))
+        elif starts is not None and kept.starts is not None:
+            self._simulated = replace(kept, starts=starts, grids=self.observations.simulate(
+                kept.plant, latency, starts, (kept.starts, kept.grids)))
+        assert self._simulated is not None
+        predicted = self.observations.observe(
+            self._simulated.plant, self._simulated.grids, extra)
         return predicted if np.all(np.isfinite(predicted)) and (
             np.max(np.abs(predicted), initial=0.0) < 1e6) else None
 
@@ -183,19 +207,42 @@ class Problem:
 
         Returns
         -------
-        numpy.ndarray, shape (n_values, n_unknowns)
+        numpy.ndarray, shape (n_values, n_columns)
+            Those of the unknowns that all pieces share, then the packed ones.
         """
+        layout = self.layout
         columns = [] if known is None else [*known.T]
         # Extras of the observation first: they need no new simulation.
-        order = sorted(range(len(columns), len(self.unknowns)),
-                       key=lambda i: not self.unknowns[i].extra)
+        shared = [int(i) for i in layout.shared[len(columns):]]
+        order = sorted(shared, key=lambda i: not self.unknowns[i].extra)
         found: dict[int, FloatArray] = {}
-        if any(self.unknowns[i].extra for i in order):
+        if any(self.unknowns[i].extra for i in order) or layout.own.size:
             self.predict(varied)
+        # Starts next: they need no new plant, and only pieces that begin in motion.
+        packed = [self._packed(column, varied, predicted) for column in layout.own.T]
         for i in order:
             found[i] = self._column(i, varied, predicted)
         columns.extend(found[i] for i in sorted(found))
+        columns.extend(packed)
         return np.column_stack(columns) if columns else np.zeros((predicted.size, 0))
+
+    def _packed(self, places: NDArray[np.int64], varied: FloatArray, predicted: FloatArray
+                ) -> FloatArray:
+        # One own unknown of every piece, all moved at once: none shows in another's values.
+        for sign in (1.0, -1.0):
+            moved = np.array(varied)
+            for i in places:
+                unknown = self.unknowns[i]
+                step = sign * unknown.step
+                inside = unknown.lower <= varied[i] + step <= unknown.upper
+                moved[i] += step if inside else -step
+            there = self.predict(moved)
+            if there is not None:
+                column = np.zeros(predicted.size)
+                for i, rows in zip(places, self.layout.rows, strict=True):
+                    column[rows] = (there[rows] - predicted[rows]) / (moved[i] - varied[i])
+                return column
+        return np.zeros(predicted.size)
 
     def _column(self, i: int, varied: FloatArray, predicted: FloatArray) -> FloatArray:
         unknown = self.unknowns[i]
@@ -212,17 +259,17 @@ class Problem:
         return np.zeros(predicted.size)
 
 
-def _inside(unknowns: Sequence[Unknown], varied: FloatArray, curvature: FloatArray,
+def _inside(problem: Problem, varied: FloatArray, curvature: FloatArray,
             gradient: FloatArray) -> FloatArray:
     # A step whose unknowns stay inside their bounds: those that would leave are put on the
     # bound, and the others are solved for again.
+    unknowns = problem.unknowns
     move = np.zeros(varied.size)
     free = np.ones(varied.size, dtype=bool)
     tried = np.array(varied)
     for _ in range(3):
         held = gradient - curvature @ np.where(free, 0.0, move)
-        part = np.ix_(free, free)
-        move[free] = np.linalg.lstsq(curvature[part], held[free], rcond=None)[0]
+        move = np.where(free, problem.layout.solve(curvature, held, free), move)
         wanted = np.array([v + (max(-1.5, min(1.5, m)) if u.logarithmic else m)
                            for u, v, m in zip(unknowns, varied, move, strict=True)])
         tried = np.array([u.varied(u.value(float(w)))
@@ -280,12 +327,12 @@ def solve(problem: Problem, start: Mapping[str, float], steps: int = 12,
         slope = metric.whiten(observations, jacobian)
         deviations = np.array([0.0 if math.isinf(u.deviation) else 1.0 / u.deviation
                                for u in problem.unknowns])
-        gradient = slope.T @ white - deviations * problem.prior(varied)
-        curvature = slope.T @ slope + np.diag(deviations ** 2)
+        gradient = problem.layout.project(slope, white) - deviations * problem.prior(varied)
+        curvature = problem.layout.gram(slope) + np.diag(deviations ** 2)
         better = False
         for _ in range(7):
             lifted = curvature + np.diag(damping * np.diag(curvature) + 1e-12)
-            tried = _inside(problem.unknowns, varied, lifted, gradient)
+            tried = _inside(problem, varied, lifted, gradient)
             there = problem.predict(tried)
             if there is not None:
                 new_cost, new_data = problem.cost(there, tried)

@@ -20,12 +20,20 @@ import numpy as np
 PERIOD = 0.01
 #: Window of a pose increment [s].
 WINDOW = 0.2
+#: Time after the start from which its state is taken [s].
+EARLY = 0.15
 #: Data after the start of a moving segment that are not used [s]: its initial state is unknown.
 SETTLE = 0.6
+#: The same where the initial state is estimated [s]: what late stamps and the windows of the
+#: sensors reach back.
+SETTLE_ESTIMATED = EARLY
 #: Highest rate that a channel is used at [1/s]; faster ones are thinned.
 FASTEST = 55.0
 #: Channels in the order of the measurement vector.
 CHANNELS = ('wheel_left', 'wheel_right', 'yaw_rate', 'advance', 'turn')
+#: Corrections of the state at the start of a piece: of the base's forward speed [m/s] and yaw
+#: rate [rad/s] and of the wheel rates on the left and on the right [rad/s].
+CORRECTIONS = ('initial_forward', 'initial_yaw', 'initial_left', 'initial_right')
 UNITS = {'wheel_left': 'rad/s', 'wheel_right': 'rad/s', 'yaw_rate': 'rad/s',
          'advance': 'm/s', 'turn': 'rad/s'}
 
@@ -76,6 +84,8 @@ class Piece:
     wheel_rates : tuple of float
     wheel_angles : tuple of float
         Initial angles [rad]; zero where no positions were recorded.
+    told : tuple of bool
+        Whether each number of :attr:`began` was measured at the start.
     """
 
     recording: str
@@ -88,6 +98,28 @@ class Piece:
     twist: BodyTwist
     wheel_rates: tuple[float, float]
     wheel_angles: tuple[float, float]
+    told: tuple[bool, bool, bool, bool] = (True, True, True, True)
+
+    @property
+    def name(self) -> str:
+        """Recording and number of the segment."""
+        return f'{self.recording}/{self.index}'
+
+    @property
+    def began(self) -> tuple[float, float, float, float]:
+        """Measured state at the start, in the order of :data:`CORRECTIONS`."""
+        return (self.twist.forward, self.twist.yaw, *self.wheel_rates)
+
+
+def correction_name(piece: Piece, place: int) -> str:
+    """Return the name of a correction of a piece's start, its place in CORRECTIONS given."""
+    return f'{CORRECTIONS[place]}@{piece.name}'
+
+
+def at_rest(piece: Piece) -> bool:
+    """Return whether a piece is known to begin at rest: by its wheels or its pose."""
+    seen = {channel.name for channel in piece.channels}
+    return not any(piece.began) and bool(seen - {'yaw_rate'})
 
 
 def _thinned(times: FloatArray) -> slice:
@@ -124,18 +156,24 @@ def _initial(series: TimeSeries | None, names: tuple[str, ...], start: float
              ) -> tuple[float, ...]:
     if series is None or not len(series):
         return tuple(0.0 for _ in names)
-    early = series.slice(start, start + 0.15)
+    early = series.slice(start, start + EARLY)
     values = early if len(early) else series
     return tuple(float(np.median(values.column(n)[:8])) for n in names)
 
 
-def piece_of(segment: Segment) -> Piece | None:
+def _tells(series: TimeSeries | None, start: float) -> bool:
+    return series is not None and len(series.slice(start, start + EARLY)) > 0
+
+
+def piece_of(segment: Segment, settle: float = SETTLE) -> Piece | None:
     """
     Prepare a segment.
 
     Parameters
     ----------
     segment : Segment
+    settle : float
+        Data after the start that are not used where it begins in motion [s].
 
     Returns
     -------
@@ -150,16 +188,18 @@ def piece_of(segment: Segment) -> Piece | None:
     wheels, imu, pose = (streams.get(n) for n in ('wheels', 'imu', 'pose'))
     rates = _initial(wheels, ('left', 'right'), start)
     yaw = _initial(imu, ('yaw_rate',), start)[0]
+    wheels_told, imu_told = (_tells(series, start) for series in (wheels, imu))
     channels: list[Channel] = []
-    forward = 0.0
+    forward, pose_told = 0.0, False
     if pose is not None and len(pose) > 3:
         increments = _increments(pose, start)
         channels.extend(increments)
         if increments and increments[0].values.size:
             forward = float(increments[0].values[0])
+            pose_told = float(increments[0].begins[0]) <= start + EARLY
             yaw = yaw if imu is not None else float(increments[1].values[0])
     still = abs(forward) < 0.05 and abs(yaw) < 0.05 and max(map(abs, rates)) < 0.3
-    begin = start if still else start + SETTLE
+    begin = start if still else start + settle
     if wheels is not None:
         part = _thinned(wheels.times)
         channels = [*(Channel(f'wheel_{side}', wheels.times[part], wheels.column(side)[part],
@@ -181,7 +221,9 @@ def piece_of(segment: Segment) -> Piece | None:
     return Piece(segment.recording, segment.index, start, count, streams['command'], kept,
                  pose if pose is not None and len(pose) > 3 else None,
                  BodyTwist() if still else BodyTwist(forward, yaw),
-                 (0.0, 0.0) if still else (rates[0], rates[1]), start_angles)
+                 (0.0, 0.0) if still else (rates[0], rates[1]), start_angles,
+                 (pose_told, imu_told if imu is not None else pose_told, wheels_told,
+                  wheels_told))
 
 
 def _after(channel: Channel, begin: float) -> Channel:

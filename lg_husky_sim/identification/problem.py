@@ -12,12 +12,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import TypeAlias
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.plant import ENCODER_WINDOW, Plant, SensorModel
 from lg_husky_sim.identification.pieces import (
     Channel,
     CHANNELS,
+    correction_name,
+    CORRECTIONS,
     PERIOD,
     Piece,
     piece_of,
@@ -25,7 +28,7 @@ from lg_husky_sim.identification.pieces import (
     UNITS,
 )
 from lg_husky_sim.recording import Segment
-from lg_husky_sim.signals import FloatArray, Pose, TimeSeries
+from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation.kernel import COLUMNS, run
 from lg_husky_sim.simulation.simulator import hold, Simulator
 import numpy as np
@@ -36,6 +39,7 @@ __all__ = ['CHANNELS', 'PERIOD', 'UNITS', 'Channel', 'Observations', 'Piece', 'S
 
 #: Time between two resets of the simulated pose to the measured one [s].
 RESET = 4.0
+Simulated: TypeAlias = tuple[FloatArray, tuple[FloatArray, ...]]
 _COLUMN = {name: i for i, name in enumerate(COLUMNS)}
 
 
@@ -105,16 +109,40 @@ class Observations:
         plant : Plant
         extra : mapping of str to float, optional
             Small unknowns of the observation that belong to no effect: latency,
-            delay_wheels, delay_imu, delay_pose [s], gyro_bias [rad/s].
+            delay_wheels, delay_imu, delay_pose [s], gyro_bias [rad/s]; and corrections of the
+            start of a piece, such as ``initial_forward@drive/3`` [m/s].
 
         Returns
         -------
         numpy.ndarray, shape (n_values,)
         """
         given = extra or {}
-        return self.observe(plant, self.simulate(plant, given.get('latency', 0.0)), given)
+        grids = self.simulate(plant, given.get('latency', 0.0), self.corrections(given))
+        return self.observe(plant, grids, given)
 
-    def simulate(self, plant: Plant, latency: float = 0.0) -> tuple[FloatArray, ...]:
+    def corrections(self, extra: Mapping[str, float]) -> FloatArray | None:
+        """
+        Return the corrections of the starts among the unknowns of the observation.
+
+        Parameters
+        ----------
+        extra : mapping of str to float
+            As in :meth:`predict`.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_pieces, 4), or None
+            In the order of :data:`~lg_husky_sim.identification.pieces.CORRECTIONS`; None if
+            there is none.
+        """
+        if not any('@' in name for name in extra):
+            return None
+        return np.array([[extra.get(correction_name(piece, place), 0.0)
+                          for place in range(len(CORRECTIONS))] for piece in self.pieces])
+
+    def simulate(self, plant: Plant, latency: float = 0.0,
+                 corrections: FloatArray | None = None, known: Simulated | None = None
+                 ) -> tuple[FloatArray, ...]:
         """
         Simulate every piece.
 
@@ -123,6 +151,11 @@ class Observations:
         plant : Plant
         latency : float
             Further dead time of the commands [s].
+        corrections : numpy.ndarray, shape (n_pieces, 4), optional
+            Of the measured starts.
+        known : tuple, optional
+            Corrections and their grids, of this plant and latency: a piece whose corrections
+            are the same is not simulated again.
 
         Returns
         -------
@@ -131,12 +164,16 @@ class Observations:
         """
         simulators: dict[int, Simulator] = {}
         grids = []
-        for piece in self.pieces:
+        for place, piece in enumerate(self.pieces):
+            own = None if corrections is None else corrections[place]
+            if known is not None and own is not None and np.array_equal(own, known[0][place]):
+                grids.append(known[1][place])
+                continue
             number = self._regime(plant, piece.recording)
             if number not in simulators:
                 simulators[number] = Simulator(self.plant_in(plant, piece.recording), PERIOD,
                                                fine_pose=False)
-            grids.append(simulate_piece(simulators[number], piece, latency))
+            grids.append(simulate_piece(simulators[number], piece, latency, own))
         return tuple(grids)
 
     def observe(self, plant: Plant, grids: Sequence[FloatArray],
@@ -185,7 +222,8 @@ class Observations:
         return Observations(tuple(p for p, k in zip(self.pieces, keep, strict=True) if k))
 
 
-def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0) -> FloatArray:
+def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
+                   correction: FloatArray | None = None) -> FloatArray:
     """
     Simulate a piece on its grid.
 
@@ -196,6 +234,8 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0) -> 
     piece : Piece
     latency : float
         Further dead time of the commands [s].
+    correction : numpy.ndarray, shape (4,), optional
+        Of the measured state at the start.
 
     Returns
     -------
@@ -204,8 +244,12 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0) -> 
     """
     commands = piece.commands
     held = _held(piece, latency)
-    state = simulator.initial(_pose_at(piece.pose, piece.start), piece.twist, piece.start,
-                              piece.wheel_rates, piece.wheel_angles)
+    twist, rates = piece.twist, piece.wheel_rates
+    if correction is not None:
+        forward, yaw, left, right = (float(c) for c in np.add(piece.began, correction))
+        twist, rates = BodyTwist(forward, yaw), (left, right)
+    state = simulator.initial(_pose_at(piece.pose, piece.start), twist, piece.start, rates,
+                              piece.wheel_angles)
     flat = np.array(state.flat)
     if len(commands) and commands.times[0] <= piece.start + PERIOD:
         _fill_command(flat, state.n, held)
@@ -320,13 +364,15 @@ def _seen(channel: Channel, piece: Piece, grid: FloatArray, angle: FloatArray,
     return chord
 
 
-def observations(segments: Sequence[Segment]) -> Observations:
+def observations(segments: Sequence[Segment], settle: float = SETTLE) -> Observations:
     """
     Prepare segments.
 
     Parameters
     ----------
     segments : sequence of Segment
+    settle : float
+        Data after the start of a moving segment that are not used [s].
 
     Returns
     -------
@@ -337,7 +383,7 @@ def observations(segments: Sequence[Segment]) -> Observations:
     RecordingError
         If none of them can be used.
     """
-    pieces = tuple(p for p in map(piece_of, segments) if p is not None)
+    pieces = tuple(p for p in (piece_of(s, settle) for s in segments) if p is not None)
     if not pieces:
         names = ', '.join(sorted({s.recording for s in segments})) or 'nothing'
         raise RecordingError(

@@ -28,6 +28,7 @@ from lg_husky_sim.identification.pictures import (
     profile_figure,
 )
 from lg_husky_sim.identification.result import FitResult
+from lg_husky_sim.identification.start_states import HEAD, summary
 from lg_husky_sim.recording import Segment
 
 #: Longest time that one picture shows [s].
@@ -153,13 +154,16 @@ def _sections(result: FitResult, pictures: Sequence[Picture]) -> list[Section]:
         ('root mean square of measured − simulated', 'before', 'fitted', 'unit', 'values'),
         [(c.name, f'{c.before:.4g}', f'{c.after:.4g}', c.unit, str(c.count))
          for c in result.channels])
+    tables = [estimates]
+    if result.start_states:
+        tables.append(Table(HEAD, summary(result.start_states)))
     # Those of the parameters come last: certainty, then profiles and convergence if there are.
     last = len(pictures) - 1 - bool(result.profiles) - bool(len(result.history))
     sections = [Section('Agreement', tables=[channels], pictures=pictures[:last])]
     if result.warnings:
         sections.append(Section('Warnings', points=result.warnings, warning=True))
     sections.append(Section(
-        'Parameters', tables=[estimates], points=result.undetermined,
+        'Parameters', tables=tables, points=result.undetermined,
         pictures=pictures[last:]))
     sections.append(Section('As text', verbatim=str(result)))
     return sections

@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 import enum
 import math
 from typing import Any
 
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.profile import Profile
+from lg_husky_sim.identification.start_states import HEAD, StartState, summary
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -125,6 +126,9 @@ class FitResult:
     converged : bool
     profiles : tuple of Profile
         Of the parameters that were asked for.
+    start_states : tuple of StartState
+        Corrections of the measured state at the start of each segment, if asked for. They are
+        not among ``estimates``, whose intervals and correlations allow for them.
     """
 
     method: Method
@@ -145,6 +149,7 @@ class FitResult:
     warnings: tuple[str, ...] = ()
     converged: bool = True
     profiles: tuple[Profile, ...] = ()
+    start_states: tuple[StartState, ...] = ()
 
     @property
     def values(self) -> dict[str, float]:
@@ -165,6 +170,8 @@ class FitResult:
             note = '  (of the recording)' if one.nuisance else ''
             lines.append(f'{one.name:<{width}}  {one.value:>11.5g}  {interval:>25}  '
                          f'{one.start:>11.5g}  {one.unit}{note}')
+        if self.start_states:
+            lines += ['', *_aligned([HEAD, *summary(self.start_states)])]
         lines += ['', f'{"channel":<{width}}  {"values":>8}  {"RMS before":>11}  {"after":>11}  '
                       'unit']
         lines += [f'{c.name:<{width}}  {c.count:>8}  {c.before:>11.4g}  {c.after:>11.4g}  {c.unit}'
@@ -207,8 +214,16 @@ class FitResult:
                 'name': p.name, 'low': _finite(p.low), 'high': _finite(p.high),
                 'values': p.values.tolist(), 'rise': [_finite(r) for r in p.rise]}
                 for p in self.profiles],
+            'start_states': [asdict(s) for s in self.start_states],
             'undetermined': list(self.undetermined), 'warnings': list(self.warnings),
         }
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ['  '.join([f'{row[0]:<{widths[0]}}', *(
+        f'{cell:>{width}}' for cell, width in zip(row[1:], widths[1:], strict=True))])
+        for row in rows]
 
 
 def _finite(value: float) -> float | None:

@@ -9,10 +9,13 @@ import math
 
 from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.effects import EffectParameter
+from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.least_squares import effect_unknown, Unknown
 from lg_husky_sim.identification.paper import paper
+from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.identification.start_states import INITIAL_STATE, settle_of, start_unknowns
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -71,8 +74,8 @@ def effect_parameters(model: ModelFile) -> dict[str, EffectParameter]:
     return {p.name: p for effect in model.structure.effects for p in effect.parameters()}
 
 
-def unknowns_of(model: ModelFile, names: Sequence[str], nuisance: Sequence[str]
-                ) -> tuple[Unknown, ...]:
+def unknowns_of(model: ModelFile, names: Sequence[str], nuisance: Sequence[str],
+                data: Observations | None = None) -> tuple[Unknown, ...]:
     """
     Return what a least-squares estimation varies.
 
@@ -82,7 +85,9 @@ def unknowns_of(model: ModelFile, names: Sequence[str], nuisance: Sequence[str]
     names : sequence of str
         Parameters, of the robot or of its effects.
     nuisance : sequence of str
-        Keys of :data:`NUISANCES`.
+        Keys of :data:`NUISANCES`, or :data:`~.start_states.INITIAL_STATE`.
+    data : Observations, optional
+        Whose starts to estimate, if asked.
 
     Returns
     -------
@@ -109,10 +114,16 @@ def unknowns_of(model: ModelFile, names: Sequence[str], nuisance: Sequence[str]
             found.append(Unknown(name, False, entry.value, math.inf, entry.lower, entry.upper,
                                  step))
     for name in nuisance:
+        if name == INITIAL_STATE and data is not None:
+            continue
         if name not in NUISANCES:
-            raise FitError(f'unknown nuisance {name!r} (known: {", ".join(NUISANCES)})')
+            known = ', '.join((*NUISANCES, INITIAL_STATE))
+            raise FitError(f'unknown nuisance {name!r} (known: {known})')
         _, lower, upper, step = NUISANCES[name]
         found.append(Unknown(name, False, 0.0, math.inf, lower, upper, step, extra=True))
+    if INITIAL_STATE in nuisance and data is not None:
+        found += start_unknowns(data, compile_model(model.structure).at(model.parameters),
+                                settle_of(model.structure, nuisance))
     return tuple(found)
 
 
@@ -141,6 +152,9 @@ def starts_of(model: ModelFile, unknowns: Sequence[Unknown], count: int, seed: i
     for number in range(max(1, count)):
         values: dict[str, float] = {}
         for unknown in unknowns:
+            if unknown.local is not None:
+                values[unknown.name] = 0.0
+                continue
             shift = float(draws.uniform(-1.0, 1.0))
             if unknown.extra:
                 values[unknown.name] = 0.0

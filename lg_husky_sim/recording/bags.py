@@ -99,7 +99,8 @@ def _files(path: Path) -> list[Path]:
     if not path.exists():
         raise RecordingError(f'no recording {path}: there is no such file or folder')
     if path.is_dir():
-        if (path / 'metadata.yaml').is_file():
+        # rosbags takes whatever ends in .bag for a ROS 1 file, a folder too: give it the parts.
+        if (path / 'metadata.yaml').is_file() and path.suffix != '.bag':
             return [path]
         parts = sorted(part for part in path.iterdir() if part.suffix in SUFFIXES)
         if len({part.suffix for part in parts}) == 1:

@@ -263,6 +263,14 @@ def test_a_folder_without_metadata_and_a_path_to_it(drive: Any, tmp_path: Path) 
     assert whole.name == 'bag'
 
 
+def test_a_rosbag2_folder_may_be_called_bag(drive: Any, tmp_path: Path) -> None:
+    path = drive.write(tmp_path / 'yard')
+    whole = read_recording(path).stream('wheels').values
+    named = read_recording(path.rename(tmp_path / 'yard.bag'))
+    np.testing.assert_array_equal(named.stream('wheels').values, whole)
+    assert named.name == 'yard'
+
+
 @pytest.mark.parametrize(('names', 'best'), [
     (('/a200_0000/joy_teleop/cmd_vel', '/a200_0000/platform/cmd_vel', '/a200_0000/cmd_vel'),
      '/a200_0000/platform/cmd_vel'),
