@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import importlib.util
 import os
+from pathlib import Path
 from typing import Any, TypeVar
 
 Function = TypeVar('Function', bound=Callable[..., Any])
@@ -32,5 +33,39 @@ def jit(function: Function) -> Function:
     if not compiled():
         return function
     import numba
-    wrapped: Function = numba.njit(cache=True, nogil=True, error_model='numpy')(function)
-    return wrapped
+    wrapped = numba.njit(cache=True, nogil=True, error_model='numpy')(function)
+    source = Path(function.__code__.co_filename)
+    if source.is_file():
+        _SOURCES.add(source)
+        forget_outdated(Path(wrapped.stats.cache_path), f'{source.stem}.{function.__name__}-',
+                        max(path.stat().st_mtime for path in _SOURCES))
+    compiled_function: Function = wrapped
+    return compiled_function
+
+
+#: Files of the compiled functions so far. What a function calls was compiled before it.
+_SOURCES: set[Path] = set()
+
+
+def forget_outdated(folder: Path, beginning: str, newest: float) -> None:
+    """
+    Remove machine code that is older than a source.
+
+    The cache only looks at the file of the function itself; its machine code also holds that of
+    the functions which it calls, and those may lie in other files.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the cache.
+    beginning : str
+        Of the names of its index files.
+    newest : float
+        Time of the last change of a source [s since the epoch].
+    """
+    for index in folder.glob(f'{beginning}*.nbi'):
+        try:
+            if index.stat().st_mtime <= newest:
+                index.unlink()
+        except FileNotFoundError:
+            continue  # another process was quicker

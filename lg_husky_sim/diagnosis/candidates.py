@@ -83,6 +83,44 @@ def candidates() -> tuple[Candidate, ...]:
     return tuple(found)
 
 
+#: Factors by which a number of an effect that is there already is tried to have changed, and the
+#: least change as a part of the catalogue's first size.
+CHANGED, LEAST_CHANGE = (1.6, 0.6), 0.5
+
+
+def changed_candidates(structure: Structure, parameters: Parameters) -> tuple[Candidate, ...]:
+    """
+    Return the effects of a structure as candidates: their numbers may have changed.
+
+    Parameters
+    ----------
+    structure : Structure
+    parameters : Parameters
+        The effects' numbers before.
+
+    Returns
+    -------
+    tuple of Candidate
+    """
+    found = []
+    for effect in structure.effects:
+        again = replace(effect, late=True, again=True)
+        if effect.again or effect.id not in catalogue() or effect.id == 'belt_compliance':
+            continue
+        now = {later.name: parameters[before.name] for before, later in zip(
+            effect.parameters(), again.parameters(), strict=True)}
+        free = [p for p in again.parameters() if not p.fixed]
+        starts = []
+        for p in free:
+            for factor in CHANGED:
+                step = (factor - 1.0) * max(abs(now[p.name]), LEAST_CHANGE * abs(p.starts[0]))
+                tried = min(max(now[p.name] + step, p.lower), p.upper)
+                if tried != now[p.name]:
+                    starts.append({**{q.name: now[q.name] for q in free}, p.name: tried})
+        found.append(Candidate(again, tuple(starts), False))
+    return tuple(found)
+
+
 def effect_unknowns(effect: Effect, start: Mapping[str, float]) -> tuple[Unknown, ...]:
     """Return the free parameters of an effect as unknowns, scaled by where they start."""
     return tuple(effect_unknown(p, start.get(p.name, p.starts[0]))
@@ -94,6 +132,11 @@ def effect_entries(effect: Effect, values: Mapping[str, float]) -> tuple[Paramet
     return tuple(
         p.parameter(min(max(values[p.name], p.lower), p.upper) if p.name in values else None)
         for p in effect.parameters())
+
+
+def is_exact(parameters: Parameters, name: str) -> bool:
+    """Return whether a parameter is given and has no tolerance: it is not varied then."""
+    return name in parameters and parameters.entry(name).tolerance == 0.0
 
 
 def nuisance(parameters: Parameters, structure: Structure, channels: tuple[str, ...]
@@ -115,7 +158,7 @@ def nuisance(parameters: Parameters, structure: Structure, channels: tuple[str, 
     tuple of Unknown
     """
     unknowns = [_within(nominal_unknown(parameters.entry(name), deviation))
-                for name, deviation in RECALIBRATED.items()]
+                for name, deviation in RECALIBRATED.items() if not is_exact(parameters, name)]
     ids = {effect.id for effect in structure.effects}
     shapes = {effect.shape for effect in structure.effects if effect.id == 'sensor_time_offset'}
     absent = set()

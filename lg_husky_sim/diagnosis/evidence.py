@@ -62,7 +62,8 @@ def held_out_cost(observations: Observations, fit: Fit, metric_: Metric, folds: 
 
 def energy(observations: Observations, fit: Fit, metric_: Metric) -> float:
     """Return the sum of squares of the scaled residual, correlation left in."""
-    scaled = (observations.measured - fit.solution.predicted) * metric_.scale
+    plain = metric_.uncorrelated
+    scaled = plain.whiten(observations, observations.measured - fit.solution.predicted)
     return float(np.sum(np.minimum(scaled ** 2, 1e6)))
 
 

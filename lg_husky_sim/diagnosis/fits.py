@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from lg_husky_sim.diagnosis.candidates import (
     effect_entries,
     effect_unknowns,
+    is_exact,
     nuisance,
     RECALIBRATED,
 )
@@ -82,7 +83,8 @@ def fit_structure(observations: Observations, structure: Structure, nominal: Par
     unknowns: list[Unknown] = list(nuisance(nominal, structure, observations.channels))
     entries: list[Parameter] = []
     for effect in structure.effects:
-        unknowns.extend(effect_unknowns(effect, effects))
+        unknowns.extend(u for u in effect_unknowns(effect, effects)
+                        if not is_exact(nominal, u.name))
         entries.extend(effect_entries(effect, {**effects, **start}))
     try:
         model = compile_model(structure)
@@ -206,7 +208,9 @@ def shared_metric(observations: Observations, fit: Fit, signatures: Sequence[Sig
     predicted = fit.solution.predicted
     residual = observations.measured - predicted
     scale = scales(observations, residual, predicted)
-    columns = np.column_stack([fit.solution.jacobian, *(s.columns for s in signatures)])
+    common = () if observations.common is None else (observations.common,)
+    columns = np.column_stack([fit.solution.jacobian, *common,
+                               *(s.columns for s in signatures)])
     norms = np.sqrt(np.sum((columns * scale[:, None]) ** 2, axis=0))
     columns = columns[:, norms > 1e-9] / norms[norms > 1e-9]
     left = residual

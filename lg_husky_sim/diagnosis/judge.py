@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
@@ -15,7 +16,7 @@ from lg_husky_sim.diagnosis.rounds import Rival, Round
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
-from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.effects import Effect, LATER, Onset, OnsetKind
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.problem import Observations
 import numpy as np
@@ -58,6 +59,12 @@ def is_near(rival: Rival, best: Rival) -> bool:
     return rival.held_out > best.held_out - max(NEAR_NATS, NEAR_SHARE * best.held_out)
 
 
+def _is_given(search: Search) -> bool:
+    onset, change = search.final.structure.onset, search.change
+    return onset is not None and change is not None and (
+        onset.recording, onset.value) == (change.recording, change.value)
+
+
 def _rivals(one: Round, named: Effect | None) -> tuple[Rivalry, ...]:
     return tuple(Rivalry(r.effect.id, r.effect.side, r.held_out)
                  for r in one.rivals if named is None or r.effect.id != named.id)
@@ -84,12 +91,14 @@ def findings(search: Search) -> tuple[Finding, ...]:
         effect = best.effect
         names = [p.name for p in effect.parameters() if not p.fixed]
         final = search.final
-        numbers = estimates(observations, final, one.metric, names)
+        numbers = tuple(replace(e, name=e.name.removesuffix(LATER)) for e in estimates(
+            observations, final, one.metric, names))
         gain = held_out_cost(observations, one.base, one.metric, folds) - held_out_cost(
             observations, best.fit, one.metric, folds)
         regime = where_it_shows(observations, gain)
-        onset = final.structure.onset if effect.late and search.change is None else None
-        statement = (f'{effect.kind.title}{_side_words(effect)}{onset_words(onset)}: '
+        onset = final.structure.onset if effect.late and not _is_given(search) else None
+        changed = 'this has changed: ' if effect.again else ''
+        statement = (f'{changed}{effect.kind.title}{_side_words(effect)}{onset_words(onset)}: '
                      f'{in_words(numbers)}. It shows {regime} and explains '
                      f'{100.0 * min(max(one.share, 0.0), 1.0):.0f} % of what was unexplained.')
         found.append(Finding(

@@ -44,7 +44,8 @@ def _middle(onsets: list[Onset], costs: list[float]) -> Onset:
     return onsets[(low + high) // 2]
 
 
-def refined_onset(observations: Observations, fit: Fit, metric: Metric) -> Onset | None:
+def refined_onset(observations: Observations, fit: Fit, metric: Metric,
+                  change: Onset | None = None) -> Onset | None:
     """
     Return a better onset for a fitted late effect.
 
@@ -54,6 +55,8 @@ def refined_onset(observations: Observations, fit: Fit, metric: Metric) -> Onset
     fit : Fit
         With an onset in its structure.
     metric : Metric
+    change : Onset, optional
+        Before which no onset is tried.
 
     Returns
     -------
@@ -66,6 +69,9 @@ def refined_onset(observations: Observations, fit: Fit, metric: Metric) -> Onset
     family = (time_onsets if onset.kind is OnsetKind.TIME else place_onsets)(observations)
     coarse = [o for o, _ in family.onsets
               if o.kind is onset.kind and bool(o.recording) == bool(onset.recording)]
+    if change is not None:
+        first = observations.recordings.index(change.recording)
+        coarse = [o for o in coarse if o.recording in observations.recordings[first:]]
     if onset.recording:
         # Onsets in a named recording lie on one line through all recordings.
         coarse.sort(key=lambda o: (observations.recordings.index(o.recording), o.value))

@@ -34,12 +34,15 @@ class Onsets:
         Each with the groups that lie after it.
     placebos : tuple of numpy.ndarray of bool, shape (n_groups,)
         Groups in which an effect is switched on for comparison.
+    given : bool
+        Whether the onset is known and not looked for.
     """
 
     groups: NDArray[np.int64]
     count: int
     onsets: tuple[tuple[Onset, NDArray[np.bool_]], ...]
     placebos: tuple[NDArray[np.bool_], ...] = ()
+    given: bool = False
 
 
 def _places(observations: Observations) -> tuple[NDArray[np.int64], FloatArray]:
@@ -89,25 +92,42 @@ def time_onsets(observations: Observations) -> Onsets:
     return Onsets(owner * width + cells, width * len(names), tuple(found))
 
 
-def one_onset(observations: Observations, onset: Onset) -> Onsets:
+def change_onsets(observations: Observations, change: Onset, found: Onset | None = None
+                  ) -> tuple[Onsets, ...]:
     """
-    Return a single onset: everything from a recording on.
+    Return the onsets of a change between recordings.
 
     Parameters
     ----------
     observations : Observations
-    onset : Onset
-        In time, in a named recording.
+    change : Onset
+        The beginning of the first later recording.
+    found : Onset, optional
+        Where a change was found before: a further one begins there too.
 
     Returns
     -------
-    Onsets
+    tuple of Onsets
+        The beginning of the later recordings, or what was found; and, unless something was found,
+        moments inside them. Placebos are single earlier recordings.
     """
-    owner, _ = _places(observations)
-    number = observations.recordings.index(onset.recording)
-    cells = np.arange(len(observations.recordings))
-    return Onsets(owner, cells.size, ((onset, cells >= number),),
-                  tuple(cells == i for i in range(number)))
+    inside = time_onsets(observations)
+    names = observations.recordings
+    number = names.index(change.recording)
+    width = inside.count // len(names)
+    owner, begins = np.divmod(np.arange(inside.count), width)
+    placebos = tuple(owner == i for i in range(number))
+    start = found or change
+    first = names.index(start.recording)
+    after = (owner > first) | ((owner == first) & (
+        (begins + 0.5) * ONSET_STEP >= start.value if found else True))
+    given = Onsets(inside.groups, inside.count, ((start, after),), placebos, True)
+    if found:
+        return (given,)
+    later = tuple((onset, groups) for onset, groups in inside.onsets
+                  if onset.recording in names[number:]
+                  and (onset.recording != change.recording or onset.value > change.value))
+    return given, Onsets(inside.groups, inside.count, later, placebos)
 
 
 def _spaced(known: FloatArray) -> FloatArray:

@@ -31,6 +31,8 @@ import numpy as np
 SERIOUS = 6
 #: Of these, those that are refitted to the end.
 POLISHED = 5
+#: The same where only a change is asked for: its refits have few unknowns.
+OF_CHANGES = (9, 6)
 #: Least held-out gain of an adopted effect, always there or late [nats].
 LEAST_GAIN = (18.0, 40.0)
 #: Least share of the unexplained energy that the first effect must explain, always there or
@@ -138,8 +140,8 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     -------
     Round
     """
-    taken = {(e.id, e.side) for e in base.structure.effects}
-    asked = [c for c in pool if (c.effect.id, c.effect.side) not in taken]
+    taken = {(e.id, e.side, e.again) for e in base.structure.effects}
+    asked = [c for c in pool if (c.effect.id, c.effect.side, c.effect.again) not in taken]
     with ThreadPoolExecutor(jobs) as workers:
         signatures = [s for found in workers.map(
             lambda c: signatures_of(c, base.structure, base.parameters, extras_of(base),
@@ -147,17 +149,19 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
                       for s in found]
     common = shared_metric(observations, base, signatures)
     late = base.structure.onset is None or only_late
-    scores = screen(observations, base, common, signatures, masks if late else ())
-    plain_metric = Metric(common.scale, {name: np.ones(1) for name in common.filters})
-    broad = screen(observations, base, plain_metric, signatures, masks if late else ())
     if only_late:
-        scores = beyond_placebo([s for s in scores if s.onset is not None])
-        broad = beyond_placebo([s for s in broad if s.onset is not None])
-    serious = _serious(scores, SERIOUS)
+        scores, broad = (
+            changes(screen(observations, base, one, signatures, masks), masks[0])
+            for one in (common, common.uncorrelated))
+    else:
+        scores, broad = (screen(observations, base, one, signatures, masks if late else ())
+                         for one in (common, common.uncorrelated))
+    most, finished = OF_CHANGES if only_late else (SERIOUS, POLISHED)
+    serious = _serious(scores, most)
     chosen = {(s.signature.candidate.label, s.onset is None) for s in serious}
-    serious += [s for s in _serious(broad, SERIOUS // 2)
+    serious += [s for s in _serious(broad, most // 2)
                 if (s.signature.candidate.label, s.onset is None) not in chosen]
-    nominal_fit = at_nominal(observations, base, nominal)
+    nominal_fit = None if only_late else at_nominal(observations, base, nominal)
     starts = [near for near in (base, nominal_fit) if near is not None]
     tasks = [(score, near) for score in serious for near in starts]
     with ThreadPoolExecutor(jobs) as workers:
@@ -169,7 +173,7 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
             if fit is not None and (number_of not in quick or fit.solution.cost
                                     < quick[number_of].solution.cost):
                 quick[number_of] = fit
-        near = sorted(quick.items(), key=lambda pair: pair[1].solution.cost)[:POLISHED]
+        near = sorted(quick.items(), key=lambda pair: pair[1].solution.cost)[:finished]
         polished = list(workers.map(
             lambda pair: refit(observations, base, nominal, serious[pair[0]], common, 6,
                                pair[1]), near))
@@ -210,6 +214,33 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     adopted = (rivals[0].held_out > LEAST_GAIN[0] and unstable < UNSTABLE and share > 0.0
                if eager else _adopts(rivals[0], share, unstable, rest, number, only_late))
     return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted, unstable, rest)
+
+
+def changes(scores: Sequence[Score], whole: Onsets) -> list[Score]:
+    """
+    Choose the onset of each change between recordings: a moment inside one must clearly pay.
+
+    Parameters
+    ----------
+    scores : sequence of Score
+        With all onsets of each candidate.
+    whole : Onsets
+        The beginning of the later recordings.
+
+    Returns
+    -------
+    list of Score
+        One of each candidate, best first.
+    """
+    given = {onset for onset, _ in whole.onsets}
+    late = beyond_placebo([s for s in scores if s.onset is not None])
+    best = {s.signature.candidate.label: s for s in late if s.onset in given}
+    for score in late:
+        label = score.signature.candidate.label
+        if score.onset not in given and (label not in best or score.gain > (
+                LATER[0] + (1.0 + LATER[1]) * best[label].gain)):
+            best[label] = score
+    return sorted(best.values(), key=lambda s: -s.gain)
 
 
 def beyond_placebo(scores: Sequence[Score]) -> list[Score]:

@@ -153,6 +153,13 @@ class Projector:
         self.basis = np.linalg.qr(np.vstack([slope, prior]))[0]
         self.residual = self._project(np.concatenate(
             [metric.whiten(observations, residual), pull]))
+        # The same for columns that are filtered only: what common errors explain comes first.
+        self.directions, self.target = self.basis[:self.size], self.residual[:self.size]
+        if observations.common is not None:
+            shared = metric.shared(observations)
+            explained = shared.directions * np.sqrt(shared.taken * (2.0 - shared.taken))
+            self.directions = np.hstack([explained, shared.without(self.directions)])
+            self.target = shared.without(self.target)
 
     def _project(self, rows: FloatArray) -> FloatArray:
         projected: FloatArray = rows - self.basis @ (self.basis.T @ rows)
@@ -181,9 +188,9 @@ class Projector:
         -------
         Sums
         """
-        white = self.metric.whiten(self.observations, columns)
+        white = self.metric.filtered(self.observations, columns)
         k = white.shape[1]
-        onto = np.zeros((count, self.basis.shape[1], k))
+        onto = np.zeros((count, self.directions.shape[1], k))
         own = np.zeros((count, k, k))
         along = np.zeros((count, k))
         order = np.argsort(groups, kind='stable')
@@ -192,9 +199,9 @@ class Projector:
             rows = order[edges[g]:edges[g + 1]]
             if rows.size:
                 part = white[rows]
-                onto[g] = self.basis[rows].T @ part
+                onto[g] = self.directions[rows].T @ part
                 own[g] = part.T @ part
-                along[g] = part.T @ self.residual[rows]
+                along[g] = part.T @ self.target[rows]
         return Sums(onto, own, along)
 
 
@@ -266,12 +273,13 @@ def scan(projector: Projector, signatures: Sequence[Signature],
     Returns
     -------
     list of Score
-        The best of each candidate without, and the best with an onset; highest gain first.
+        The best of each candidate without, with a given onset and with another; highest gain
+        first.
     """
-    best: dict[tuple[str, bool], Score] = {}
+    best: dict[tuple[str, str], Score] = {}
 
-    def offer(score: Score) -> None:
-        key = (score.signature.candidate.label, score.onset is not None)
+    def offer(score: Score, kind: str) -> None:
+        key = (score.signature.candidate.label, kind)
         if key not in best or score.gain > best[key].gain:
             best[key] = score
 
@@ -280,14 +288,19 @@ def scan(projector: Projector, signatures: Sequence[Signature],
         if not signature.candidate.effect.kind.needs_onset:
             sums = projector.sums(signature.columns, whole, 1)
             gain, size = sums.gain(slice(None), signature.free_sign)
-            offer(Score(signature, gain, size))
+            offer(Score(signature, gain, size), 'always')
+        summed: dict[int, Sums] = {}
         for family in onsets:
             if not family.onsets:
                 continue
-            sums = projector.sums(signature.columns, family.groups, family.count)
+            if id(family.groups) not in summed:
+                summed[id(family.groups)] = projector.sums(signature.columns, family.groups,
+                                                           family.count)
+            sums = summed[id(family.groups)]
             placebo = max((sums.gain(groups, signature.free_sign)[0]
                            for groups in family.placebos), default=0.0)
             for onset, groups in family.onsets:
                 gain, size = sums.gain(groups, signature.free_sign)
-                offer(Score(signature, gain, size, onset, placebo))
+                offer(Score(signature, gain, size, onset, placebo),
+                      'given' if family.given else 'late')
     return sorted(best.values(), key=lambda s: -s.gain)

@@ -15,11 +15,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from lg_husky_sim.diagnosis.candidates import candidates
+from lg_husky_sim.diagnosis.candidates import candidates, changed_candidates
 from lg_husky_sim.diagnosis.evidence import folds_of
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate
 from lg_husky_sim.diagnosis.onset_placing import refined_onset
-from lg_husky_sim.diagnosis.onsets import one_onset, Onsets, place_onsets, time_onsets
+from lg_husky_sim.diagnosis.onsets import change_onsets, Onsets, place_onsets, time_onsets
 from lg_husky_sim.diagnosis.rounds import LEAST_GAIN, play_round, Round
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.model import Structure
@@ -100,12 +100,14 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
     base, rounds = plain, []
     folds = folds_of(observations)
     masks: tuple[Onsets, ...] = ()
-    if change is not None:
-        masks = (one_onset(observations, change),)
-    elif onsets:
+    if change is None and onsets:
         masks = (time_onsets(observations), place_onsets(observations))
     pool = candidates()
+    if change is not None:
+        pool = (*pool, *changed_candidates(structure, plain.parameters))
     for number in range(most + 1):
+        if change is not None:
+            masks = change_onsets(observations, change, base.structure.onset)
         progress(f'round {number + 1}: signatures and refits', number / (most + 1))
         one = play_round(observations, base, nominal, pool, masks, folds, number,
                          only_late=change is not None, eager=eager, jobs=jobs)
@@ -113,7 +115,7 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         if not one.adopted or number == most:
             break
         base = with_better_onset(observations, one.rivals[0].fit, nominal, one.metric,
-                                 change is None)
+                                 change)
         base = without_idle(observations, base, nominal, one.metric, structure)
         kept = set(base.structure.effects)
         rounds = [r for r in rounds if not r.adopted or _same(r, kept)]
@@ -156,7 +158,7 @@ def without_idle(observations: Observations, fit: Fit, nominal: Parameters, metr
 
 
 def with_better_onset(observations: Observations, fit: Fit, nominal: Parameters,
-                      metric_: Metric, movable: bool) -> Fit:
+                      metric_: Metric, change: Onset | None) -> Fit:
     """
     Return a fit with its onset placed finely, refitted.
 
@@ -166,14 +168,16 @@ def with_better_onset(observations: Observations, fit: Fit, nominal: Parameters,
     fit : Fit
     nominal : Parameters
     metric_ : Metric
-    movable : bool
-        Whether the onset is an estimate.
+    change : Onset or None
+        The beginning of the later recordings, if a change was asked for: such an onset is given.
 
     Returns
     -------
     Fit
     """
-    onset = refined_onset(observations, fit, metric_) if movable else None
+    if fit.structure.onset is None or fit.structure.onset == change:
+        return fit
+    onset = refined_onset(observations, fit, metric_, change)
     if onset is None:
         return fit
     sizes = {**fit.parameters, **fit.solution.values}

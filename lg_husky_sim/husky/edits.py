@@ -301,6 +301,8 @@ def edit(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     ParameterError
         If the effect does not fit the network.
     """
+    # The numbers of a changed effect have other names; the edit is the same.
+    effect = replace(effect, again=False)
     if effect.id.startswith('smooth_'):
         return _described(network, effect)
     return _BY_SUBSYSTEM[effect.kind.subsystem.value](network, effect)

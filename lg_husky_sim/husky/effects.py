@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import difflib
 import enum
 from functools import cache
@@ -35,6 +35,10 @@ class OnsetKind(enum.Enum):
     TIME = 'time'
     PLACE_ABOVE = 'place_above'
     PLACE_BELOW = 'place_below'
+
+
+#: What the names of a changed effect's numbers end in.
+LATER = '_later'
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,9 @@ class Effect:
         Variant of form; empty where there is one only.
     late : bool
         Whether it begins at the structure's onset instead of being there always.
+    again : bool
+        Whether it takes the place of the same effect of the same side, with numbers of its own:
+        what was there already and changes at the onset.
 
     Raises
     ------
@@ -150,6 +157,7 @@ class Effect:
     side: str = ''
     shape: str = ''
     late: bool = False
+    again: bool = False
 
     def __post_init__(self) -> None:
         """Fill defaults and check against the catalogue."""
@@ -179,7 +187,14 @@ class Effect:
                   ('viscous_asymmetry', 'slip'): 'extra_damping',
                   ('viscous_asymmetry', 'bearing'): 'damping_change',
                   ('driver_deadband', 'zone'): 'dead_edge'}.get((self.id, self.shape))
-        return tuple(p for p in self.kind.parameters if p.name != unused)
+        own = tuple(p for p in self.kind.parameters if p.name != unused)
+        return tuple(replace(p, name=p.name + LATER) for p in own) if self.again else own
+
+    @property
+    def renamed(self) -> dict[str, str]:
+        """Names of its numbers by those that the edits of the graph know."""
+        return {p.name.removesuffix(LATER): p.name for p in self.parameters()} if (
+            self.again) else {}
 
 
 def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:

@@ -20,6 +20,11 @@ from lg_husky_sim.signals import FloatArray
 
 #: Coefficients that a row can hold.
 WIDTH = 24
+#: Where a row holds the voltage that its source cannot exceed [V]; 0 for none. A speed loop may
+#: ask for more than the supply has: what acts behind the driver only sees what the driver gives.
+CEILING = WIDTH - 1
+#: Laws that act on a voltage of the driver.
+OF_THE_DRIVER = (7, 8, 9, 10, 11, 12)
 #: Length of the context vector: time, heading, x, y, angle_left, angle_right.
 CONTEXT = 6
 #: Length of the memory vector: heat of both motors, play of both gears.
@@ -122,9 +127,11 @@ def _table(coefficients: FloatArray, c: int, j: int, argument: float) -> float:
 
 @jit
 def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int,
-                memory: FloatArray, time: float) -> float:
+                memory: FloatArray, time: float, ceiling: float) -> float:
     # Laws of the electrical side: what the driver adds to its own voltage.
     own: float = z[o]
+    if ceiling > 0.0:
+        own = _clip(own, -ceiling, ceiling)
     if law == 7:
         return _clip(own, p2 * z[o + 1] - p1 * p0, p2 * z[o + 1] + p1 * p0) - own
     if law == 8:
@@ -134,7 +141,10 @@ def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int
     if law == 10:
         return _clip(own, -p0, p0) - own
     if law == 11:
-        return float(-own / p1 * p0 * (own * z[o + 2] + z[o + 1] * z[o + 3]) / p1)
+        other: float = z[o + 1]
+        if ceiling > 0.0:
+            other = _clip(other, -ceiling, ceiling)
+        return float(-own / p1 * p0 * (own * z[o + 2] + other * z[o + 3]) / p1)
     if law == 12:
         return -own * min(p0 * max(time, 0.0), p1)
     if law == 13:
@@ -192,7 +202,8 @@ def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatA
             selector = int(p0)
             out[j] = _table(coefficients, c, j, z[o] if selector < 0 else context[selector])
         else:
-            out[j] = _source_law(law, p0, p1, p2, z, o, memory, context[0])
+            out[j] = _source_law(law, p0, p1, p2, z, o, memory, context[0],
+                                 coefficients[c, j, CEILING])
 
 
 @jit

@@ -58,6 +58,10 @@ class Structure:
         for effect in self.effects:
             if effect.late and self.onset is None:
                 raise ParameterError(f'effect {effect.id} is late, but there is no onset')
+            if effect.again and not any((e.id, e.side, e.again) == (effect.id, effect.side, False)
+                                        for e in self.effects):
+                raise ParameterError(
+                    f'effect {effect.id} is there again, but it was not there before')
 
     def with_effect(self, effect: Effect, onset: Onset | None = None) -> Structure:
         """Return this structure with one effect more; a belt needs the expanded drivetrain."""
@@ -82,10 +86,27 @@ class Structure:
         graph = network.simplified() if self.drivetrain is Drivetrain.SIMPLIFIED else (
             network.expanded())
         edited = EditedNetwork(graph)
-        for effect in self.effects:
-            if late or not effect.late:
-                edited = edit(edited, effect)
+        for effect in self.in_force(late):
+            edited = edit(edited, effect)
         return edited
+
+    def in_force(self, late: bool = True) -> tuple[Effect, ...]:
+        """
+        Return the effects that act.
+
+        Parameters
+        ----------
+        late : bool
+            Whether the late effects are in.
+
+        Returns
+        -------
+        tuple of Effect
+            Without those whose place a changed one has taken.
+        """
+        there = [e for e in self.effects if late or not e.late]
+        changed = {(e.id, e.side) for e in there if e.again}
+        return tuple(e for e in there if e.again or (e.id, e.side) not in changed)
 
 
 def _outputs(edited: EditedNetwork) -> tuple[str, ...]:
@@ -97,8 +118,9 @@ def _outputs(edited: EditedNetwork) -> tuple[str, ...]:
 class _Regime:
     """One network, analysed; gives a :class:`PlantSet` for numbers."""
 
-    def __init__(self, edited: EditedNetwork) -> None:
+    def __init__(self, edited: EditedNetwork, renamed: Mapping[str, str]) -> None:
         self.edited = edited
+        self._renamed = dict(renamed)
         self.numeric: NumericModel = compile_numeric(edited.graph, _outputs(edited))
         rows = [edited.laws[name] for name in self.numeric.efforts]
         self._laws = np.array([int(row.law) for row in rows], dtype=np.int64)
@@ -113,6 +135,8 @@ class _Regime:
                 self._volts[0 if name.endswith('_1') else 1, j] = 1.0
 
     def at(self, values: Mapping[str, float]) -> PlantSet:
+        if self._renamed:
+            values = {**values, **{name: values[own] for name, own in self._renamed.items()}}
         space: StateSpace = self.numeric.at(values)
         coefficients = np.zeros((self._laws.size, WIDTH))
         numbers = eval(self._code, dict(GLOBALS), values)  # noqa: S307 (our own expressions)
@@ -176,13 +200,20 @@ class HuskyModel:
         return Plant(sets, states, self.structure.onset)
 
 
+def _regime(structure: Structure) -> _Regime:
+    renamed: dict[str, str] = {}
+    for effect in structure.in_force():
+        renamed.update(effect.renamed)
+    return _Regime(structure.network(), renamed)
+
+
 @lru_cache(maxsize=512)
 def _compiled(drivetrain: Drivetrain, effects: tuple[Effect, ...]) -> tuple[_Regime, ...]:
     marked = Structure(drivetrain, tuple(replace(e, late=False) for e in effects))
-    regimes = [_Regime(marked.network())]
+    regimes = [_regime(marked)]
     if any(effect.late for effect in effects):
         early = Structure(drivetrain, tuple(e for e in effects if not e.late))
-        regimes.insert(0, _Regime(early.network()))
+        regimes.insert(0, _regime(early))
         if len(regimes[0].numeric.states) != len(regimes[1].numeric.states) or (
                 regimes[0].edited.speed_loop != regimes[1].edited.speed_loop):
             raise ParameterError(

@@ -91,14 +91,16 @@ def _parameter(name: str, entry: object) -> Parameter:
 def _effect(index: int, entry: object, shared: set[str]
             ) -> tuple[Effect, tuple[Parameter, ...]]:
     data = _mapping(f'effect {index + 1}', entry)
-    unknown = sorted(set(data) - {'effect', 'side', 'shape', 'late', 'parameters'})
+    unknown = sorted(set(data) - {'effect', 'side', 'shape', 'late', 'again', 'parameters'})
     if unknown:
         raise ModelFileError(f'effect {index + 1}: unknown key {shown(unknown[0])}')
-    late = data.get('late', False)
-    if not isinstance(late, bool):
-        raise ModelFileError(f'effect {index + 1}: late = {shown(late)} is neither true nor false')
+    flags = {name: data.get(name, False) for name in ('late', 'again')}
+    for name, flag in flags.items():
+        if not isinstance(flag, bool):
+            raise ModelFileError(
+                f'effect {index + 1}: {name} = {shown(flag)} is neither true nor false')
     effect = Effect(str(data.get('effect', '')), str(data.get('side') or ''),
-                    str(data.get('shape') or ''), late)
+                    str(data.get('shape') or ''), **flags)
     given = _mapping(f'effect {effect.id}: parameters', data.get('parameters', {}))
     known = {p.name: p for p in effect.parameters()}
     parameters = []
@@ -279,6 +281,7 @@ def model_data(model: ModelFile) -> dict[str, object]:
                        if p.name not in of_effects or p.name in shared},
         'effects': [
             {'effect': effect.id, 'side': effect.side, 'shape': effect.shape, 'late': effect.late,
+             **({'again': True} if effect.again else {}),
              'parameters': {p.name: _entry(model.parameters.entry(p.name))
                             for p in effect.parameters() if p.name not in shared}}
             for effect in model.structure.effects],

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from lg_husky_sim.husky.laws import Law, WIDTH
+from lg_husky_sim.husky.laws import CEILING, Law, OF_THE_DRIVER, WIDTH
 from lg_husky_sim.husky.plant import PlantSet
 import numpy as np
 
@@ -25,6 +25,8 @@ def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
         w_f' = (r/T - w_f) / loop_lag
         V    = T w_f + loop_gain (w_f - w) + I,   clipped to the supply
         I'   = loop_integral (w_f - w) + (V_clipped - V) loop_integral / (loop_gain + T)
+
+    Effects that act on the driver's voltage see it clipped.
 
     Parameters
     ----------
@@ -65,6 +67,8 @@ def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
     h[arguments:] = volts
     rows = np.hstack([plant.rows, np.zeros((9, 4))]) + plant.rows_u @ volts
     rows_f = np.hstack([plant.rows_f, plant.rows_u])
+    inner = np.array(plant.coefficients)
+    inner[np.isin(plant.laws, OF_THE_DRIVER), CEILING] = values['supply_voltage']
     clip = np.zeros((2, WIDTH))
     clip[:, 0] = values['supply_voltage']
     return replace(
@@ -73,5 +77,5 @@ def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
         laws=np.concatenate([plant.laws, np.full(2, int(Law.CLIP), dtype=np.int64)]),
         offsets=np.concatenate([plant.offsets,
                                 np.array([arguments, arguments + 1], dtype=np.int64)]),
-        coefficients=np.vstack([plant.coefficients, clip]),
+        coefficients=np.vstack([inner, clip]),
         command=replace(plant.command, clamp=0.0))

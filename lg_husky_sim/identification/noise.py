@@ -12,7 +12,8 @@ squares is a log-likelihood (in half nats).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
@@ -27,8 +28,63 @@ ORDER = 8
 #: Smallest noise that is believed [unit of each channel]: below it a channel is taken as exact.
 LEAST = {'wheel_left': 0.004, 'wheel_right': 0.004, 'yaw_rate': 0.001, 'advance': 0.002,
          'turn': 0.001}
+#: Root mean square of normal values without the largest tenth.
+TRIMMED = 0.789
+#: Share of differences below a tenth of a deviation from which values move in steps: 0.08 if
+#: they were normal.
+STILL = 0.3
 #: A pose increment further off than this many robust deviations is a jump of the localisation.
 JUMP = 9.0
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """
+    Directions of common errors, whitened.
+
+    With the errors' coefficients drawn from a unit normal, the residual's covariance is
+    I + U diag(s^2) U'; its inverse root, which this applies, is I - U diag(1 - 1/sqrt(1 + s^2)) U'.
+
+    Parameters
+    ----------
+    observations : Observations
+        Kept, so that nothing else takes its identity.
+    directions : numpy.ndarray, shape (n_values, n)
+        U, orthonormal columns.
+    taken : numpy.ndarray, shape (n,)
+        Part of each direction that is taken away.
+    """
+
+    observations: Observations
+    directions: FloatArray
+    taken: FloatArray
+
+    def without(self, white: FloatArray) -> FloatArray:
+        """Return whitened values less their common part, shape as given."""
+        along = self.directions.T @ white
+        along *= self.taken if white.ndim == 1 else self.taken[:, None]
+        left: FloatArray = white - self.directions @ along
+        return left
+
+
+def shared_of(observations: Observations, columns: FloatArray) -> Shared:
+    """
+    Return the directions of whitened columns.
+
+    Parameters
+    ----------
+    observations : Observations
+    columns : numpy.ndarray, shape (n_values, n_common)
+
+    Returns
+    -------
+    Shared
+    """
+    squares, rotation = np.linalg.eigh(columns.T @ columns)
+    kept = squares > 1e-6 * max(float(squares.max(initial=0.0)), 1e-12)
+    sizes = np.sqrt(squares[kept])
+    directions = columns @ (rotation[:, kept] / sizes)
+    return Shared(observations, directions, 1.0 - 1.0 / np.sqrt(1.0 + squares[kept]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,16 +102,66 @@ class Metric:
 
     scale: FloatArray
     filters: Mapping[str, FloatArray]
+    _shared: dict[int, Shared] = field(default_factory=dict, init=False, repr=False)
 
     def whiten(self, observations: Observations, values: FloatArray) -> FloatArray:
         """
-        Return values scaled and filtered, shape as given: (n_values,) or (n_values, k).
+        Return values scaled, filtered and freed of common errors.
 
         Parameters
         ----------
         observations : Observations
-        values : numpy.ndarray
+        values : numpy.ndarray, shape (n_values,) or (n_values, k)
             Residuals, or columns of derivatives.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape as given.
+        """
+        white = self.filtered(observations, values)
+        if observations.common is None:
+            return white
+        return self.shared(observations).without(white)
+
+    @cached_property
+    def uncorrelated(self) -> Metric:
+        """The same scale without the correlation."""
+        return Metric(self.scale, {name: np.ones(1) for name in self.filters})
+
+    def shared(self, observations: Observations) -> Shared:
+        """
+        Return what whitening does to the observations' common errors.
+
+        Parameters
+        ----------
+        observations : Observations
+
+        Returns
+        -------
+        Shared
+        """
+        key = id(observations)
+        if key not in self._shared:
+            columns = observations.common
+            self._shared[key] = shared_of(observations, np.zeros((
+                observations.measured.size, 0)) if columns is None else self.filtered(
+                    observations, columns))
+        return self._shared[key]
+
+    def filtered(self, observations: Observations, values: FloatArray) -> FloatArray:
+        """
+        Return values scaled and filtered, common errors left in.
+
+        Parameters
+        ----------
+        observations : Observations
+        values : numpy.ndarray, shape (n_values,) or (n_values, k)
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape as given.
         """
         scaled = values * (self.scale if values.ndim == 1 else self.scale[:, None])
         white = np.empty_like(scaled)
@@ -73,6 +179,32 @@ def spread(values: FloatArray) -> float:
     if values.size == 0:
         return 0.0
     return float(1.4826 * np.median(np.abs(values - np.median(values))))
+
+
+def stepwise(values: FloatArray) -> float:
+    """
+    Return the standard deviation of values that mostly do not change, else 0.
+
+    A counted encoder's reading stays on one step most of the time, so that the median tells
+    nothing; the root mean square without the largest tenth does.
+
+    Parameters
+    ----------
+    values : numpy.ndarray, shape (n,)
+        Differences between neighbours.
+
+    Returns
+    -------
+    float
+        Standard deviation, if it were normal; 0 where the median can be believed.
+    """
+    sizes = np.sort(np.abs(values[np.abs(values) > 0.0]))
+    inner = sizes[:int(0.9 * sizes.size)]
+    if not inner.size:
+        return 0.0
+    size = float(np.sqrt(np.mean(inner ** 2))) / TRIMMED
+    near = float(np.mean(np.abs(values) < 0.1 * size))
+    return size if near > STILL else 0.0
 
 
 def scales(observations: Observations, residual: FloatArray, predicted: FloatArray
@@ -94,7 +226,8 @@ def scales(observations: Observations, residual: FloatArray, predicted: FloatArr
     for name in observations.channels:
         slices = [s for s in observations.slices if s.channel == name]
         steps = np.concatenate([np.diff(residual[s.first:s.last]) for s in slices])
-        level = max(spread(steps) / np.sqrt(2.0), LEAST[name])
+        level = max(spread(steps), stepwise(steps)) / np.sqrt(2.0)
+        level = max(level, LEAST[name])
         whole = np.concatenate([residual[s.first:s.last] for s in slices])
         wide = spread(whole)
         for s in slices:

@@ -61,6 +61,9 @@ class Observations:
     Parameters
     ----------
     pieces : tuple of Piece
+    common : numpy.ndarray, shape (n_values, n_common), optional
+        Columns of errors that a model may make everywhere alike, each of the size that is
+        believed possible; a metric gives them no weight.
     measured : numpy.ndarray, shape (n_values,)
     times : numpy.ndarray, shape (n_values,)
         Stamp of each value on its recording's clock [s].
@@ -69,6 +72,7 @@ class Observations:
     """
 
     pieces: tuple[Piece, ...]
+    common: FloatArray | None = None
     measured: FloatArray = field(init=False)
     times: FloatArray = field(init=False)
     slices: tuple[Slice, ...] = field(init=False)

@@ -239,7 +239,8 @@ def run(hidden: Hidden, drive: manoeuvres.Manoeuvre, pose: Pose, index: int | No
     move = integrate_engine if hidden.world == 'g2' else integrate
     robot = hidden.robot
     fields = hidden.fields if with_effect else robot.fields
-    path = replace(hidden.command, since=since) if with_effect else robot.command
+    path = replace(hidden.command, since=since, own=robot.command.limits) if with_effect \
+        else robot.command
     off, on = world.vector(robot.fields), world.vector(fields)
     demand = _demand(fields, path, drive, rng)
     rough = np.zeros((2, 5))

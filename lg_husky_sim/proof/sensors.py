@@ -23,7 +23,8 @@ class CommandPath:
 
     Times in seconds, rates in m/s² and rad/s², limits in m/s and rad/s (0: none),
     `since` the time from which effects hold, `loop_lag` the time constant of a speed
-    loop's reference, `loop_yaw_ratio` its wheel-to-yaw multiplier.
+    loop's reference, `loop_yaw_ratio` its wheel-to-yaw multiplier. `own` are latency,
+    slews and limits that hold until then: a robot as sold has some of its own.
     """
 
     gain: float = w.COMMAND_GAIN
@@ -41,6 +42,13 @@ class CommandPath:
     loop_lag: float = 0.0
     loop_yaw_ratio: float = 1.875
     cutback: float = 0.0
+    own: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def limits(self) -> tuple[float, float, float, float, float]:
+        """Latency, slews forward and yaw, limits forward and yaw."""
+        return (self.latency, self.slew_forward, self.slew_yaw, self.limit_forward,
+                self.limit_yaw)
 
 
 @dataclass(frozen=True)
@@ -91,7 +99,7 @@ def received(drive: Manoeuvre, path: CommandPath, rng: np.random.Generator | Non
         arrive = publish + rng.uniform(path.delay_low, path.delay_high + 1e-9, publish.size)
         kept = rng.random(publish.size) >= path.loss
     active = publish >= path.since
-    arrive = arrive + np.where(active, path.latency, 0.0)
+    arrive = arrive + np.where(active, path.latency, path.own[0])
     if path.stutter_period > 0.0:
         phase = np.mod(arrive, path.stutter_period)
         frozen = active & (phase < path.stutter_hold)
@@ -102,13 +110,16 @@ def received(drive: Manoeuvre, path: CommandPath, rng: np.random.Generator | Non
     held = drive.commands[kept][np.maximum(which, 0)]
     held[which < 0] = 0.0
     on = times >= path.since
-    for column, limit in ((0, path.limit_forward), (1, path.limit_yaw)):
-        if limit > 0.0:
-            held[:, column] = np.where(
-                on, np.clip(held[:, column], -limit, limit), held[:, column])
-    for column, slew in ((0, path.slew_forward), (1, path.slew_yaw)):
-        if slew > 0.0:
-            held[:, column] = _slewed(held[:, column], slew * step, on)
+    for column in (0, 1):
+        # 0 stands for no limit.
+        limit = np.where(on, path.limits[3 + column], path.own[3 + column])
+        limit[limit <= 0.0] = np.inf
+        held[:, column] = np.clip(held[:, column], -limit, limit)
+    for column in (0, 1):
+        slew = np.where(on, path.limits[1 + column], path.own[1 + column])
+        if np.any(slew > 0.0):
+            slew[slew <= 0.0] = np.inf
+            held[:, column] = _slewed(held[:, column], slew * step)
     if path.cutback > 0.0:
         busy = np.mod(times, 11.0) > 8.5
         held[on & busy] *= 1.0 - path.cutback
@@ -117,16 +128,15 @@ def received(drive: Manoeuvre, path: CommandPath, rng: np.random.Generator | Non
     return held
 
 
-def _slewed(values: Vector, most: float, on: NDArray[np.bool_]) -> Vector:
-    """Limit the change per step, visiting only the stretches where it matters."""
+def _slewed(values: Vector, most: Vector) -> Vector:
+    """Limit the change per step."""
     result = values.copy()
     for k in range(1, values.size):
-        if on[k]:
-            change = values[k] - result[k - 1]
-            if change > most:
-                result[k] = result[k - 1] + most
-            elif change < -most:
-                result[k] = result[k - 1] - most
+        change = values[k] - result[k - 1]
+        if change > most[k]:
+            result[k] = result[k - 1] + most[k]
+        elif change < -most[k]:
+            result[k] = result[k - 1] - most[k]
     return result
 
 
