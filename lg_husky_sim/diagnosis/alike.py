@@ -29,6 +29,9 @@ from scipy.signal import lfilter
 BELIEVED = 0.3
 #: Time constants by which the quantities are smoothed [s]; 0 for as they are.
 LAGS = (0.0, 0.25, 1.0)
+#: Relative deviation of the robot's numbers that is believed possible at most, and the part of an
+#: effect's number that a derivative's step is.
+UNSURE, STEP = 0.2, 0.05
 #: Speeds at which a sign is smoothed [m/s, rad/s].
 SLOW_FORWARD, SLOW_YAW = 0.08, 0.12
 
@@ -41,7 +44,8 @@ def with_common_errors(observations: Observations, fit: Fit) -> Observations:
     ----------
     observations : Observations
     fit : Fit
-        Of the robot before the change: its prediction is what the errors are functions of.
+        Of the robot before the change, with its derivatives on all recordings: its prediction is
+        what the errors are functions of, and its numbers are only known so well.
 
     Returns
     -------
@@ -68,7 +72,17 @@ def with_common_errors(observations: Observations, fit: Fit) -> Observations:
         size = np.sqrt(np.sum(block ** 2, axis=0) / max(
             int(np.count_nonzero(observations.channel_mask(name))), 1))
         block *= BELIEVED * sizes[name] / np.where(size > 1e-9, size, np.inf)
-    return replace(observations, common=columns)
+    return replace(observations, common=np.hstack([columns, _of_numbers(fit)]))
+
+
+def _of_numbers(fit: Fit) -> FloatArray:
+    # What another value of each number would change, by the deviation that is believed.
+    unknowns = [(i, u) for i, u in enumerate(fit.solution.unknowns) if not u.extra]
+    sizes = [min(u.deviation, UNSURE) if u.logarithmic
+             else UNSURE * max(abs(fit.solution.values[u.name]), u.step / STEP)
+             for _, u in unknowns]
+    scaled: FloatArray = fit.solution.jacobian[:, [i for i, _ in unknowns]] * np.array(sizes)
+    return scaled
 
 
 def _quantities_at_rest() -> Sequence[FloatArray]:

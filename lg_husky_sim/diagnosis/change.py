@@ -10,7 +10,14 @@ from dataclasses import replace
 from lg_husky_sim.diagnosis.alike import with_common_errors
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.evidence import energy
-from lg_husky_sim.diagnosis.fits import Fit, fit_structure, first_metric, recalibrate
+from lg_husky_sim.diagnosis.fits import (
+    extras_of,
+    first_metric,
+    Fit,
+    fit_structure,
+    recalibrate,
+)
+from lg_husky_sim.diagnosis.held_out import plant_of
 from lg_husky_sim.diagnosis.search import Progress, Search, search
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import Structure
@@ -33,6 +40,8 @@ STARTS: tuple[Mapping[str, float], ...] = (
      'loop_integral': 4.0})
 #: A loop hides the dampings, so that their nominal values say little: factor on them to begin.
 DAMPED = 5.0
+#: Energy that numbers from all recordings may leave more in the earlier ones.
+AS_GOOD = 1.01
 #: Refits under scales that are taken anew.
 AGAIN = 2
 #: The same is kept if it leaves less than this part of what the plain robot leaves.
@@ -44,9 +53,9 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     """
     Search for the effect that separates later recordings from earlier ones.
 
-    The earlier recordings alone decide what the robot is like. What that model still gets wrong
-    may be wrong in all recordings alike; only what is left then, in the later ones alone, is a
-    change.
+    The earlier recordings alone decide what the robot is like; its numbers are held from then on.
+    What that model still gets wrong may be wrong in all recordings alike; only what is left
+    then, in the later ones alone, is a change.
 
     Parameters
     ----------
@@ -67,6 +76,8 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     before = whole.subset([piece.recording in baseline for piece in whole.pieces])
     progress('before the change: what the base closes', 0.0)
     start = closed_base(before, nominal.structure, nominal.parameters)
+    if start is not None:
+        start = _as_in_all(before, whole, start, nominal)
     known = start or search(
         before, nominal.structure, nominal.parameters,
         lambda text, share: progress(f'before the change: {text}', 0.4 * share),
@@ -74,8 +85,11 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     first = next(piece for piece in whole.pieces if piece.recording not in baseline)
     onset = Onset(OnsetKind.TIME, first.start, first.recording)
     exact = known.parameters.with_entries(*(
-        replace(known.parameters.entry(name), tolerance=0.0) for name in nominal.parameters))
-    return search(with_common_errors(whole, known), known.structure, exact,
+        replace(p, tolerance=0.0) for p in known.parameters.entries))
+    moved = fit_structure(whole, known.structure, nominal.parameters,
+                          first_metric(whole, whole.predict(plant_of(known), extras_of(known))),
+                          known.solution.values, known.parameters, 0, polish=False) or known
+    return search(with_common_errors(whole, moved), known.structure, exact,
                   lambda text, share: progress(text, 0.4 + 0.5 * share),
                   change=onset, start=known, jobs=jobs)
 
@@ -102,26 +116,59 @@ def closed_base(observations: Observations, structure: Structure, nominal: Param
     whole = structure
     for effect in lacking:
         whole = whole.with_effect(effect)
-    metric = first_metric(observations, plain.solution.predicted)
     fits = []
     for start in STARTS:
-        entries = [p for effect in lacking for p in effect_entries(effect, start)]
-        given = nominal.with_entries(*entries)
+        given = nominal.with_entries(*(
+            p for effect in lacking for p in effect_entries(effect, start)))
         sizes = {name: given[name] for name in given}
         begin = {**sizes, **{name: DAMPED * sizes[name] for name in (
             'wheel_damping', 'yaw_damping')}}
-        fit = fit_structure(observations, whole, given, metric, begin, sizes, 6, polish=False)
-        for _ in range(AGAIN):
-            if fit is not None:
-                nearer = first_metric(observations, fit.solution.predicted)
-                fit = fit_structure(observations, whole, nominal, nearer, fit.solution.values,
-                                    fit.parameters, 8, polish=False)
-        if fit is not None:
-            fits.append(fit)
-    if not fits:
+        fits.append(_fitted(observations, whole, given, begin, plain))
+    usable = [fit for fit in fits if fit is not None]
+    if not usable:
         return None
-    common = first_metric(observations, fits[0].solution.predicted)
-    best = min(fits, key=lambda fit: energy(observations, fit, common))
+    metric = first_metric(observations, usable[0].solution.predicted)
+    best = min(usable, key=lambda fit: energy(observations, fit, metric))
+    for start in STARTS:
+        # Where the fit without a limit is good, none is found from there: put one in.
+        limited = {name: start[name] for name in ('slew_forward', 'slew_yaw')}
+        given = nominal.with_entries(*(
+            p for effect in lacking for p in effect_entries(effect, start)))
+        again = _fitted(observations, whole, given, {**best.solution.values, **limited}, best)
+        if again is not None and energy(observations, again, metric) < energy(
+                observations, best, metric):
+            best = again
     if energy(observations, best, metric) > CLEARLY * energy(observations, plain, metric):
         return None
     return recalibrate(observations, whole, nominal, best)
+
+
+def _as_in_all(before: Observations, whole: Observations, fit: Fit, nominal: ModelFile) -> Fit:
+    # What all recordings together say of the base, if it explains the earlier ones as well:
+    # these alone may leave open which of two numbers it is.
+    everywhere = closed_base(whole, nominal.structure, nominal.parameters)
+    if everywhere is None:
+        return fit
+    again = _fitted(before, everywhere.structure, nominal.parameters.with_entries(*(
+        everywhere.parameters.entry(p.name) for e in everywhere.structure.effects
+        for p in e.parameters())), everywhere.solution.values, fit)
+    metric = first_metric(before, fit.solution.predicted)
+    if again is None or energy(before, again, metric) > AS_GOOD * energy(before, fit, metric):
+        return fit
+    return recalibrate(before, again.structure, nominal.parameters, again)
+
+
+def _fitted(observations: Observations, structure: Structure, parameters: Parameters,
+            begin: Mapping[str, float], near: Fit) -> Fit | None:
+    # Refits under scales that are taken anew; the first ones are those of a fit nearby.
+    fit: Fit | None = near
+    for _ in range(1 + AGAIN):
+        if fit is None:
+            break
+        metric = first_metric(observations, fit.solution.predicted)
+        sizes = {name: parameters[name] for name in parameters}
+        fit = fit_structure(observations, structure, parameters, metric, begin, sizes, 8,
+                            polish=False)
+        if fit is not None:
+            begin = fit.solution.values
+    return fit

@@ -23,6 +23,8 @@ import numpy as np
 
 #: Gain from which something is missing, whatever it is [nats].
 CERTAIN = 45.0
+#: The same for a change between recordings, where much else differs a little [nats].
+CERTAIN_CHANGE = 150.0
 #: Way per wheel angle [m/rad] below which the ground does not push the robot: a twentieth of
 #: the smallest wheel.
 NO_GRIP = 0.015
@@ -152,6 +154,8 @@ def is_unnamed(search: Search, unnamed: Unnamed) -> bool:
     first = search.rounds[0]
     screened = first.scores[0].gain if first.scores else 0.0
     tried = max((r.held_out for r in first.rivals), default=0.0)
+    if search.change is not None:
+        return tried > CERTAIN_CHANGE
     return screened > CERTAIN or tried > CERTAIN or (
         unnamed.held_out > CERTAIN and unnamed.share > 0.0)
 

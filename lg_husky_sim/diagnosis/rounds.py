@@ -48,8 +48,10 @@ FURTHER_GAIN = (100.0, 0.06)
 UNSTABLE = 0.35
 #: How much more a change must explain after it than in any recording before it.
 PLACEBO = 2.0
-#: Least share of the unexplained energy that a change between recordings must explain.
-CHANGE_SHARE = 0.15
+#: Least share of the unexplained energy that a change between recordings must explain: with a
+#: moderate gain, with one above the number of nats that follows, and after another change.
+CHANGE_SHARE = (0.15, 0.05, 0.5)
+CHANGE_GAIN = 100.0
 #: What a late effect must gain more than the same one without an onset: nats and share.
 LATER = (12.0, 0.15)
 
@@ -280,7 +282,8 @@ def _adopts(best: Rival, share: float, unstable: float, rest: float, number: int
     if best.held_out < LEAST_GAIN[late] or unstable > UNSTABLE:
         return False
     if change:
-        return share > CHANGE_SHARE
+        return share > (CHANGE_SHARE[2] if number > 0 else
+                        CHANGE_SHARE[best.held_out > CHANGE_GAIN])
     if number > 0:
         return share > FURTHER_SHARE or (
             best.held_out > FURTHER_GAIN[0] and share > FURTHER_GAIN[1] and rest < MUCH)

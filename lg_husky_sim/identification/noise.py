@@ -43,7 +43,8 @@ class Shared:
     Directions of common errors, whitened.
 
     With the errors' coefficients drawn from a unit normal, the residual's covariance is
-    I + U diag(s^2) U'; its inverse root, which this applies, is I - U diag(1 - 1/sqrt(1 + s^2)) U'.
+    I + U diag(s^2) U'. Its inverse root, which this applies, is I - U diag(t) U' with
+    t = 1 - 1/sqrt(1 + s^2).
 
     Parameters
     ----------

@@ -150,8 +150,12 @@ def start_unknowns(data: Observations, plant: Plant, settle: float
     Raises
     ------
     FitError
-        If two pieces have one name.
+        If two pieces have one name, or the data have common errors, which tie all pieces to each
+        other.
     """
+    if data.common is not None:
+        raise FitError(f'{INITIAL_STATE} cannot be estimated where errors are common to all '
+                       'segments')
     names = [piece.name for piece in data.pieces]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:

@@ -92,9 +92,9 @@ class Hidden:
 
 
 def _others(first: str, names: list[str]) -> list[str]:
-    """Names that may join `first` in a pair: another subsystem, or clearly another cause."""
+    """Names that may join `first` in a pair: of another subsystem."""
     same = catalogue.subsystem(first)
-    return [name for name in names if name != first and catalogue.subsystem(name) != same]
+    return [name for name in names if catalogue.subsystem(name) != same]
 
 
 def choose(spec: Spec, rng: np.random.Generator) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -108,6 +108,9 @@ def choose(spec: Spec, rng: np.random.Generator) -> tuple[tuple[str, ...], tuple
     elif spec.kind == 'outside':
         chosen = (str(rng.choice(sorted(catalogue.OUTSIDE))),)
     else:
+        if spec.kind == 'pair':
+            # Pairs hold all along, and ground that is the same all along has not changed.
+            names = [name for name in names if name != 'terrain_change']
         first = str(rng.choice(names))
         chosen = (first,)
         if spec.kind == 'pair':
