@@ -82,7 +82,7 @@ def shared_of(observations: Observations, columns: FloatArray) -> Shared:
     Shared
     """
     squares, rotation = np.linalg.eigh(columns.T @ columns)
-    kept = squares > 1e-6 * max(float(squares.max(initial=0.0)), 1e-12)
+    kept = squares > 1e-11 * max(float(squares.max(initial=0.0)), 1e-12)
     sizes = np.sqrt(squares[kept])
     directions = columns @ (rotation[:, kept] / sizes)
     return Shared(observations, directions, 1.0 - 1.0 / np.sqrt(1.0 + squares[kept]))
