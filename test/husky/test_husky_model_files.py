@@ -187,3 +187,16 @@ def test_short_forms_take_the_catalogues_defaults(tmp_path: Path) -> None:
     assert model.parameters['slope_x'] == 3.0
     assert model.parameters['slope_y'] == 8.0
     assert model.parameters.entry('slope_x').unit == 'N'
+
+
+def test_a_changed_effect_survives_the_file(tmp_path: Path) -> None:
+    model = load_model()
+    structure = model.structure.with_effect(Effect('command_latency')).with_effect(
+        Effect('command_latency', late=True, again=True), Onset(OnsetKind.TIME, 3.0, 'rec1'))
+    parameters = model.parameters.with_entries(*(
+        p.parameter(0.2 if p.name.endswith('_later') else 0.1)
+        for effect in structure.effects for p in effect.parameters()))
+    save_model(ModelFile(structure, parameters), tmp_path / 'model.yaml')
+    again = load_model(tmp_path / 'model.yaml')
+    assert again.structure == structure
+    assert (again.parameters['latency'], again.parameters['latency_later']) == (0.1, 0.2)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, Pose, TimeSeries
@@ -103,3 +104,18 @@ def test_two_effects_and_one_of_them_late(robot: Maker) -> None:
     early, late = driven(robot('rolling_resistance')), driven(plant)
     np.testing.assert_allclose(late.values[:151], early.values[:151], rtol=0, atol=1e-9)
     assert apart(late, early)[-1] > 0.01
+
+
+def test_an_effect_that_is_there_may_change(robot: Maker) -> None:
+    """The dead time is that of the base until the onset, and another one from then on."""
+    late = Effect('command_latency', late=True, again=True)
+    plant = robot('command_latency', late, onset=Onset(OnsetKind.TIME, 2.0), latency=0.1,
+                  latency_later=0.5)
+    assert [one.command.latency for one in plant.sets] == [0.1, 0.5]
+    assert late.parameters()[0].name == 'latency_later'
+    assert late.renamed == {'latency': 'latency_later'}
+
+
+def test_what_was_not_there_cannot_be_there_again(robot: Maker) -> None:
+    with pytest.raises(ParameterError, match='command_latency is there again'):
+        robot(Effect('command_latency', late=True, again=True), onset=Onset(OnsetKind.TIME, 2.0))

@@ -91,3 +91,11 @@ def test_stable_over_the_bounds_of_its_gains(robot: Maker) -> None:
                 assert poles.real.max() < 1e-9, (lag, gain, integral)
                 out = driven(plant, (0.4, 0.2), seconds=4.0)
                 assert np.abs(out[:, SPEED]).max() < 1.0, (lag, gain, integral)
+
+
+def test_a_driver_that_clips_holds_its_voltage(robot: Maker) -> None:
+    """The loop asks for more and more than the driver gives; the motor gets what it gives."""
+    out = driven(robot('speed_loop', 'voltage_saturation', clip_voltage=12.0, loop_gain=0.5,
+                       loop_integral=30.0), (1.0, 0.0))
+    assert out[-1, V_LEFT] == pytest.approx(12.0, rel=1e-6)
+    assert out[-1, LEFT] == pytest.approx(12.0 / T, rel=0.02)
