@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
+from lg_husky_sim.diagnosis.doubts import belief, reading_gain
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.regimes import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
@@ -282,7 +283,8 @@ def confidence(search: Search, verdict: Verdict) -> float:
     for rival in first.rivals:
         by_name[rival.effect.id] = max(by_name.get(rival.effect.id, -np.inf), rival.held_out)
     gains = sorted(by_name.values(), reverse=True)
-    return name_confidence(gains)
+    remaining = reading_gain(search.observations, search.final)
+    return name_confidence(gains) * belief(strongest, first.share, remaining)
 
 
 def recalibration(search: Search, nominal: Parameters) -> tuple[Estimate, ...]:

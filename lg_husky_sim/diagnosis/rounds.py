@@ -34,7 +34,7 @@ POLISHED = 5
 #: The same where only a change is asked for: its refits have few unknowns.
 OF_CHANGES = (9, 6)
 #: Least held-out gain of an adopted effect, always there or late [nats].
-LEAST_GAIN = (18.0, 40.0)
+LEAST_GAIN = (26.0, 45.0)
 #: Least share of the unexplained energy that the first effect must explain, always there or
 #: late: where the rest is near the sensors' noise, and where much remains unexplained.
 LEAST_SHARE = (0.003, 0.02)

@@ -158,10 +158,10 @@ def describe(observations: Observations, signatures: Sequence[Signature], projec
         held_out = 0.0
         for fold in range(count):
             out = folds == fold
-            weights = _ridge(columns[~out], target[~out])
+            weights = ridge(columns[~out], target[~out])
             left = target[out] - columns[out] @ weights
             held_out += 0.5 * float(target[out] @ target[out] - left @ left)
-        weights = _ridge(columns, target)
+        weights = ridge(columns, target)
         left = (residual - signature.columns @ weights) * scale
         names = [n for n in signature.start if n in KNOTS]
         knots = tuple(float(w) * signature.start[n] for w, n in zip(weights, names, strict=True))
@@ -171,7 +171,8 @@ def describe(observations: Observations, signatures: Sequence[Signature], projec
     return tuple(sorted(found, key=lambda d: -d.held_out))
 
 
-def _ridge(columns: FloatArray, target: FloatArray) -> FloatArray:
+def ridge(columns: FloatArray, target: FloatArray) -> FloatArray:
+    """Return coefficients of columns with a small ridge, shape (n_columns,)."""
     gram = columns.T @ columns
     lift = 1e-3 * float(np.trace(gram)) / gram.shape[0] + 1e-9
     weights: FloatArray = np.linalg.solve(gram + lift * np.eye(gram.shape[0]),
