@@ -89,9 +89,17 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     moved = fit_structure(whole, known.structure, nominal.parameters,
                           first_metric(whole, whole.predict(plant_of(known), extras_of(known))),
                           known.solution.values, known.parameters, 0, polish=False) or known
-    return search(with_common_errors(whole, moved), known.structure, exact,
-                  lambda text, share: progress(text, 0.4 + 0.5 * share),
-                  change=onset, start=known, jobs=jobs)
+    found = search(with_common_errors(whole, moved), known.structure, exact,
+                   lambda text, share: progress(text, 0.4 + 0.5 * share),
+                   change=onset, start=known, jobs=jobs)
+    return replace(found, plain=_unheld(found.plain, known), final=_unheld(found.final, known))
+
+
+def _unheld(fit: Fit, known: Fit) -> Fit:
+    # The numbers were held for the search only.
+    return replace(fit, parameters=fit.parameters.with_entries(*(
+        replace(fit.parameters.entry(p.name), tolerance=p.tolerance)
+        for p in known.parameters.entries)))
 
 
 def closed_base(observations: Observations, structure: Structure, nominal: Parameters

@@ -162,7 +162,7 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
     culprit = names[0].subsystem if names else None
     listed = mismatches(whole, residual, whole.measured - best.solution.predicted, culprit)
     plain_out, augmented_out = held_out_errors(
-        found.plain, found.final, nominal.parameters, own, found.rounds[-1].metric)
+        found.plain, found.final, found.nominal, own, found.rounds[-1].metric)
     return Diagnosis(
         verdict, judge.confidence(found, verdict), names,
         judge.indistinguishable(found), listed,

@@ -13,7 +13,7 @@ material share of what was unexplained.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.candidates import candidates, changed_candidates
 from lg_husky_sim.diagnosis.evidence import folds_of
@@ -46,6 +46,8 @@ class Search:
     final : Fit
         With the adopted effects.
     rounds : tuple of Round
+    nominal : Parameters
+        What every refit started from: centres of the priors, or numbers that are held.
     change : Onset or None
         Where every effect begins, if what changed between recordings was asked for.
     """
@@ -53,7 +55,8 @@ class Search:
     observations: Observations
     plain: Fit
     final: Fit
-    rounds: tuple[Round, ...] = field(default=())
+    rounds: tuple[Round, ...]
+    nominal: Parameters
     change: Onset | None = None
 
 
@@ -119,7 +122,7 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         base = without_idle(observations, base, nominal, one.metric, structure)
         kept = set(base.structure.effects)
         rounds = [r for r in rounds if not r.adopted or _same(r, kept)]
-    return Search(observations, plain, base, tuple(rounds), change)
+    return Search(observations, plain, base, tuple(rounds), nominal, change)
 
 
 def _same(one: Round, kept: set[Effect]) -> bool:
