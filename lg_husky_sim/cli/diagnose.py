@@ -28,9 +28,12 @@ import click
               help='Kept for reproducible scripts: the search itself draws nothing by chance.')
 @click.option('--jobs', type=click.IntRange(min=1), default=None, metavar='N',
               help='Processes to use; as many as there are cores by default.')
+@click.option('--report/--no-report', 'with_report', default=True, show_default=True,
+              help='Whether to write report.html and the pictures, a third of the time.')
 def command(
     recordings: tuple[str, ...], out: Path, baselines: tuple[str, ...], robot: Path | None,
     settings: tuple[str, ...], topics: tuple[str, ...], seed: int, jobs: int | None,
+    with_report: bool,
 ) -> None:
     """
     Say what physics a model lacks, where it shows, and how much better it gets with it.
@@ -50,7 +53,8 @@ def command(
 
     del seed
     check_folder(out, MARKER)
-    check_extras()
+    if with_report:
+        check_extras()
     model = apply_settings(load_model(robot), parse_settings(settings))
     choice = TopicMap.parse(topics)
     with tqdm(total=100, desc='reading', disable=None, leave=False,
@@ -63,8 +67,8 @@ def command(
         after = [read_recording(path, choice) for path in recordings]
         before = [read_recording(path, choice) for path in baselines]
         case = diagnose(after, model, progress, before, jobs or os.cpu_count() or 1)
-        progress('report and pictures', 0.95)
+        progress('report and pictures' if with_report else 'files', 0.95)
         with result_folder(out, MARKER) as folder:
-            write_files(folder, case)
+            write_files(folder, case, with_report)
     click.echo(summary_text(case.diagnosis))
-    click.echo(f'{out / "report.html"}')
+    click.echo(f'{out / ("report.html" if with_report else MARKER)}')

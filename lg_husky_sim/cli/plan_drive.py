@@ -101,7 +101,8 @@ def _from_folder(folder: Path) -> tuple[Rival, Rival]:
             f'{place} names no effect with a rival; there is nothing to tell apart')
     plain, model = load_model(folder / 'plain.yaml'), load_model(folder / 'model.yaml')
     kept = {e.id for e in plain.structure.effects}
-    first = next(e for e in model.structure.effects if e.id == name and e.id not in kept)
+    first = next(e for e in model.structure.effects
+                 if e.id == name and (e.again or e.id not in kept))
     found = typical(name, plain.structure, model.parameters, first.side)
     numbers = {p.name: model.parameters[p.name] for p in first.parameters()}
     one = Rival(name, found.structure, found.parameters.replacing(numbers), (numbers,))

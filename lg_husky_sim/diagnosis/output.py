@@ -73,7 +73,7 @@ def summary_text(diagnosis: Diagnosis) -> str:
     return '\n'.join(lines)
 
 
-def write_files(folder: Path, case: Case) -> None:
+def write_files(folder: Path, case: Case, with_report: bool = True) -> None:
     """
     Write the files of a diagnosis.
 
@@ -82,6 +82,8 @@ def write_files(folder: Path, case: Case) -> None:
     folder : pathlib.Path
         An empty folder.
     case : Case
+    with_report : bool
+        Whether to write report.html and the pictures too.
 
     Raises
     ------
@@ -89,7 +91,8 @@ def write_files(folder: Path, case: Case) -> None:
         If the report cannot be made.
     """
     diagnosis = case.diagnosis
-    write_report(folder, case, headline(diagnosis))
+    if with_report:
+        write_report(folder, case, headline(diagnosis))
     save_model(diagnosis.model, folder / 'model.yaml')
     save_model(diagnosis.plain_model, folder / 'plain.yaml')
     (folder / 'diagnosis.txt').write_text(summary_text(diagnosis) + '\n', encoding='utf-8')

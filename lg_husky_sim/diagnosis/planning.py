@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import math
 
 from lg_husky_sim.comparison.output import simulate_commands
-from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.candidates import changed_candidates, effect_entries
 from lg_husky_sim.diagnosis.fits import fit_structure
 from lg_husky_sim.errors import DiagnosisError, LgHuskyError
 from lg_husky_sim.husky.effects import Effect
@@ -80,6 +80,8 @@ def typical(name: str, structure: Structure, parameters: Parameters, side: str =
     """
     Return an effect of the catalogue at a typical size on top of a model.
 
+    One that the model has already is taken with other numbers.
+
     Parameters
     ----------
     name : str
@@ -98,6 +100,13 @@ def typical(name: str, structure: Structure, parameters: Parameters, side: str =
     ParameterError
         If the effect is unknown or does not fit the structure.
     """
+    there = next((c for c in changed_candidates(structure, parameters)
+                  if c.effect.id == name and side in ('', c.effect.side)), None)
+    if there is not None:
+        effect = replace(there.effect, late=False)
+        entries = effect_entries(effect, there.starts[0])
+        return Rival(name, structure.with_effect(effect), parameters.with_entries(*entries),
+                     tuple(dict(start) for start in there.starts[:STARTS]))
     bare = Effect(name, side)
     effect = replace(bare, late=False)
     free = [p for p in effect.parameters() if not p.fixed]

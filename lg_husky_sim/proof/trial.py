@@ -22,7 +22,7 @@ from lg_husky_sim.proof.cases import generate, Spec
 from lg_husky_sim.proof.scoring import judge, Judgement
 from lg_husky_sim.proof.sealing import unseal, write_json
 
-TRIES = 5
+TRIES = 100
 """Draws of one robot before a seed is given up."""
 
 REDRAWN = 1_000_003
@@ -144,7 +144,7 @@ def command_for(folders: Folders, name: str, out: Path) -> list[str]:
     case = folders.cases / name
     command = [sys.executable, '-m', 'lg_husky_sim.cli.main', 'diagnose',
                *(str(path) for path in sorted((case / 'recordings').iterdir())),
-               '--out', str(out), '--seed', '0', '--jobs', '1']
+               '--out', str(out), '--seed', '0', '--jobs', '1', '--no-report']
     if (case / 'baseline').exists():
         for path in sorted((case / 'baseline').iterdir()):
             command += ['--baseline', str(path)]

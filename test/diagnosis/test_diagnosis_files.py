@@ -186,3 +186,9 @@ def test_missing_extra_is_said_before_the_work(module: str, folder: Path, tmp_pa
     assert run(['diagnose', str(folder.parent / HOSTILE), '--out', str(tmp_path / 'out')]) == 1
     assert f'{module} is needed to' in capsys.readouterr().err
     assert not (tmp_path / 'out').exists()
+
+
+def test_files_without_a_report(diagnosed: Callable[[str], Case], tmp_path: Path) -> None:
+    write_files(tmp_path, diagnosed('nothing'), with_report=False)
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        'diagnosis.json', 'diagnosis.txt', 'model.yaml', 'plain.yaml']
