@@ -27,13 +27,16 @@ import click
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
               help='Kept for reproducible scripts: the search itself draws nothing by chance.')
 @click.option('--jobs', type=click.IntRange(min=1), default=None, metavar='N',
-              help='Processes to use; as many as there are cores by default.')
+              help='Threads to use; as many as there are cores by default.')
+@click.option('--scheduler', default=None, metavar='ADDRESS',
+              help='Dask scheduler that takes the work instead (tcp://10.0.0.1:8786); its workers '
+                   'need this package.')
 @click.option('--report/--no-report', 'with_report', default=True, show_default=True,
               help='Whether to write report.html and the pictures, a third of the time.')
 def command(
     recordings: tuple[str, ...], out: Path, baselines: tuple[str, ...], robot: Path | None,
     settings: tuple[str, ...], topics: tuple[str, ...], seed: int, jobs: int | None,
-    with_report: bool,
+    scheduler: str | None, with_report: bool,
 ) -> None:
     """
     Say what physics a model lacks, where it shows, and how much better it gets with it.
@@ -45,6 +48,7 @@ def command(
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     from lg_husky_sim.diagnosis.diagnose import diagnose
     from lg_husky_sim.diagnosis.output import MARKER, summary_text, write_files
+    from lg_husky_sim.diagnosis.workers import Workers
     from lg_husky_sim.folders import check_folder, result_folder
     from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
     from lg_husky_sim.identification.pages import check_extras
@@ -66,7 +70,8 @@ def command(
 
         after = [read_recording(path, choice) for path in recordings]
         before = [read_recording(path, choice) for path in baselines]
-        case = diagnose(after, model, progress, before, jobs or os.cpu_count() or 1)
+        case = diagnose(after, model, progress, before,
+                        Workers(jobs or os.cpu_count() or 1, scheduler))
         progress('report and pictures' if with_report else 'files', 0.95)
         with result_folder(out, MARKER) as folder:
             write_files(folder, case, with_report)

@@ -19,6 +19,7 @@ from lg_husky_sim.diagnosis.fits import (
 )
 from lg_husky_sim.diagnosis.held_out import plant_of
 from lg_husky_sim.diagnosis.search import Progress, Search, search
+from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.model_file import ModelFile
@@ -49,7 +50,7 @@ CLEARLY = 0.5
 
 
 def search_change(whole: Observations, baseline: Collection[str], nominal: ModelFile,
-                  progress: Progress, jobs: int = 1) -> Search:
+                  progress: Progress, workers: Workers = HERE) -> Search:
     """
     Search for the effect that separates later recordings from earlier ones.
 
@@ -65,8 +66,8 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
         Names of the earlier recordings.
     nominal : ModelFile
     progress : callable
-    jobs : int
-        Threads to use.
+    workers : Workers
+        What does the independent work.
 
     Returns
     -------
@@ -81,7 +82,7 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     known = start or search(
         before, nominal.structure, nominal.parameters,
         lambda text, share: progress(f'before the change: {text}', 0.4 * share),
-        most=BEFORE, onsets=False, eager=True, jobs=jobs).final
+        most=BEFORE, onsets=False, eager=True, workers=workers).final
     first = next(piece for piece in whole.pieces if piece.recording not in baseline)
     onset = Onset(OnsetKind.TIME, first.start, first.recording)
     exact = known.parameters.with_entries(*(
@@ -91,7 +92,7 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
                           known.solution.values, known.parameters, 0, polish=False) or known
     found = search(with_common_errors(whole, moved), known.structure, exact,
                    lambda text, share: progress(text, 0.4 + 0.5 * share),
-                   change=onset, start=known, jobs=jobs)
+                   change=onset, start=known, workers=workers)
     return replace(found, plain=_unheld(found.plain, known), final=_unheld(found.final, known))
 
 

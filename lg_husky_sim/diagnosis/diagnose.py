@@ -16,6 +16,7 @@ from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
 from lg_husky_sim.diagnosis.rounds import MUCH
 from lg_husky_sim.diagnosis.search import Progress, Search, search
 from lg_husky_sim.diagnosis.unnamed import described_structure, look_for_unnamed, Unnamed
+from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
@@ -95,7 +96,7 @@ def with_intervals(case: Search, nominal: Parameters) -> tuple[Parameter, ...]:
 
 
 def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Progress,
-             baseline: Sequence[Recording] = (), jobs: int = 1) -> Case:
+             baseline: Sequence[Recording] = (), workers: Workers = HERE) -> Case:
     """
     Locate, name, model and show what a model lacks.
 
@@ -108,8 +109,8 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         Told what is being done and how far it is (0 to 1).
     baseline : sequence of Recording
         Recordings of the same robot before a change: the question is then what changed.
-    jobs : int
-        Threads to use.
+    workers : Workers
+        What does the independent work.
 
     Returns
     -------
@@ -127,9 +128,9 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     names = [r.name for r in recordings]
     if baseline:
         from lg_husky_sim.diagnosis.change import search_change
-        found = search_change(whole, {r.name for r in baseline}, nominal, progress, jobs)
+        found = search_change(whole, {r.name for r in baseline}, nominal, progress, workers)
     else:
-        found = search(whole, nominal.structure, nominal.parameters, progress, jobs=jobs)
+        found = search(whole, nominal.structure, nominal.parameters, progress, workers=workers)
     found = replace(found, final=ordered(found.final, whole.recordings))
     progress('numbers', 0.9)
     own = tuple(s for s in parts if s.recording in names)

@@ -5,21 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from lg_husky_sim.diagnosis.candidates import Candidate, neutral
+from lg_husky_sim.diagnosis.candidates import Candidate
 from lg_husky_sim.diagnosis.evidence import energy, held_out_cost, instability
-from lg_husky_sim.diagnosis.fits import at_nominal, extras_of, Fit, fit_structure, shared_metric
+from lg_husky_sim.diagnosis.fits import at_nominal, Fit, fit_structure, shared_metric
 from lg_husky_sim.diagnosis.onsets import Onsets
+from lg_husky_sim.diagnosis.refits import look, Looked, Refit, run_refit
 from lg_husky_sim.diagnosis.screening import (
     Projector,
     scan,
     Score,
     Signature,
-    signatures_of,
+    without_columns,
 )
-from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
@@ -115,7 +115,8 @@ class Round:
 
 def play_round(observations: Observations, base: Fit, nominal: Parameters,
                pool: Sequence[Candidate], masks: Sequence[Onsets], folds: FloatArray,
-               number: int, only_late: bool = False, eager: bool = False, jobs: int = 1) -> Round:
+               number: int, only_late: bool = False, eager: bool = False,
+               workers: Workers = HERE) -> Round:
     """
     Play one round of the search.
 
@@ -135,8 +136,8 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     eager : bool
         Whether to adopt whatever predicts held-out data better: for a good description, not for
         a name.
-    jobs : int
-        Threads for the refits; the kernel runs without the interpreter's lock.
+    workers : Workers
+        What looks at candidates and refits them.
 
     Returns
     -------
@@ -144,11 +145,8 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     """
     taken = {(e.id, e.side, e.again) for e in base.structure.effects}
     asked = [c for c in pool if (c.effect.id, c.effect.side, c.effect.again) not in taken]
-    with ThreadPoolExecutor(jobs) as workers:
-        signatures = [s for found in workers.map(
-            lambda c: signatures_of(c, base.structure, base.parameters, extras_of(base),
-                                    observations, base.solution.predicted), asked)
-                      for s in found]
+    signatures = [s for found in workers.map(
+        look, [Looked(c, base, observations) for c in asked]) for s in found]
     common = shared_metric(observations, base, signatures)
     late = base.structure.onset is None or only_late
     if only_late:
@@ -165,20 +163,17 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
                 if (s.signature.candidate.label, s.onset is None) not in chosen]
     nominal_fit = None if only_late else at_nominal(observations, base, nominal)
     starts = [near for near in (base, nominal_fit) if near is not None]
-    tasks = [(score, near) for score in serious for near in starts]
-    with ThreadPoolExecutor(jobs) as workers:
-        tried = list(workers.map(
-            lambda task: refit(observations, task[1], nominal, task[0], common), tasks))
-        quick: dict[int, Fit] = {}
-        for (score, _), fit in zip(tasks, tried, strict=True):
-            number_of = serious.index(score)
-            if fit is not None and (number_of not in quick or fit.solution.cost
-                                    < quick[number_of].solution.cost):
-                quick[number_of] = fit
-        near = sorted(quick.items(), key=lambda pair: pair[1].solution.cost)[:finished]
-        polished = list(workers.map(
-            lambda pair: refit(observations, base, nominal, serious[pair[0]], common, 6,
-                               pair[1]), near))
+    tasks = [(k, near) for k in range(len(serious)) for near in starts]
+    lean = [without_columns(score) for score in serious]
+    tried = workers.map(run_refit, [Refit(observations, near, nominal, lean[k], common)
+                                    for k, near in tasks])
+    quick: dict[int, Fit] = {}
+    for (k, _), fit in zip(tasks, tried, strict=True):
+        if fit is not None and (k not in quick or fit.solution.cost < quick[k].solution.cost):
+            quick[k] = fit
+    near = sorted(quick.items(), key=lambda pair: pair[1].solution.cost)[:finished]
+    polished = workers.map(run_refit, [
+        Refit(observations, base, nominal, lean[k], common, 6, fit) for k, fit in near])
     fits = [(serious[k], fit) for (k, _), fit in zip(near, polished, strict=True)]
     usable = [(score, fit) for score, fit in fits if fit is not None]
     rebased = fit_structure(observations, base.structure, nominal, common,
@@ -334,47 +329,3 @@ def _serious(scores: Sequence[Score], most: int) -> list[Score]:
         if len(chosen) >= most:
             break
     return chosen
-
-
-def _sized(score: Score) -> dict[str, float]:
-    # Values of an effect's parameters from a score's multiples.
-    candidate = score.signature.candidate
-    start = dict(score.signature.start)
-    if candidate.signed:
-        return {name: neutral(name) + float(np.clip(size, -8.0, 8.0)) * (value - neutral(name))
-                for (name, value), size in zip(start.items(), score.size, strict=True)}
-    return start
-
-
-def refit(observations: Observations, base: Fit, nominal: Parameters, score: Score,
-          metric_: Metric, steps: int = 2, start: Fit | None = None) -> Fit | None:
-    """
-    Put a scored candidate into the base and refit everything.
-
-    Parameters
-    ----------
-    observations : Observations
-    base : Fit
-    nominal : Parameters
-    score : Score
-    metric_ : Metric
-    steps : int
-    start : Fit, optional
-        Where an earlier, shorter refit of the same candidate ended; it is then polished.
-
-    Returns
-    -------
-    Fit or None
-    """
-    effect = replace(score.signature.candidate.effect, late=score.onset is not None)
-    try:
-        structure = base.structure.with_effect(effect, score.onset)
-    except LgHuskyError:
-        return None
-    sized = _sized(score)
-    sizes = {**{name: base.parameters[name] for e in base.structure.effects
-                for name in (p.name for p in e.parameters())}, **sized}
-    begin = {**base.solution.values, **sized} if start is None else dict(start.solution.values)
-    near = base if start is None else None
-    return fit_structure(observations, structure, nominal, metric_, begin, sizes, steps,
-                         near, polish=start is not None)

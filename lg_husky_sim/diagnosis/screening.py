@@ -74,6 +74,12 @@ class Score:
     placebo: float = 0.0
 
 
+def without_columns(score: Score) -> Score:
+    """Return a score without the columns of its signature, which a refit does not need."""
+    return replace(score, signature=replace(
+        score.signature, columns=np.zeros((0, score.signature.columns.shape[1]))))
+
+
 def signatures_of(candidate: Candidate, structure: Structure, parameters: Parameters,
                   extra: Mapping[str, float], observations: Observations, base: FloatArray
                   ) -> list[Signature]:

@@ -21,6 +21,7 @@ from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate
 from lg_husky_sim.diagnosis.onset_placing import refined_onset
 from lg_husky_sim.diagnosis.onsets import change_onsets, Onsets, place_onsets, time_onsets
 from lg_husky_sim.diagnosis.rounds import LEAST_GAIN, play_round, Round
+from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.parameters import Parameters
@@ -70,7 +71,7 @@ def _silent(text: str, share: float) -> None:
 def search(observations: Observations, structure: Structure, nominal: Parameters,
            progress: Progress = _silent, most: int = MOST, onsets: bool = True,
            change: Onset | None = None, start: Fit | None = None, eager: bool = False,
-           jobs: int = 1) -> Search:
+           workers: Workers = HERE) -> Search:
     """
     Search the catalogue.
 
@@ -92,8 +93,8 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         A fit of the structure to some of the data, to begin from.
     eager : bool
         Whether a good description is wanted rather than a name.
-    jobs : int
-        Threads to use.
+    workers : Workers
+        What does the independent work.
 
     Returns
     -------
@@ -113,7 +114,7 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
             masks = change_onsets(observations, change, base.structure.onset)
         progress(f'round {number + 1}: signatures and refits', number / (most + 1))
         one = play_round(observations, base, nominal, pool, masks, folds, number,
-                         only_late=change is not None, eager=eager, jobs=jobs)
+                         only_late=change is not None, eager=eager, workers=workers)
         rounds.append(one)
         if not one.adopted or number == most:
             break

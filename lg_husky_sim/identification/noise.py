@@ -105,6 +105,10 @@ class Metric:
     filters: Mapping[str, FloatArray]
     _shared: dict[int, Shared] = field(default_factory=dict, init=False, repr=False)
 
+    def __reduce__(self) -> tuple[type[Metric], tuple[FloatArray, Mapping[str, FloatArray]]]:
+        """Leave out what was worked out for observations of this process."""
+        return Metric, (self.scale, dict(self.filters))
+
     def whiten(self, observations: Observations, values: FloatArray) -> FloatArray:
         """
         Return values scaled, filtered and freed of common errors.

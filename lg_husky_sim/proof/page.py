@@ -151,7 +151,7 @@ def page_of(results: Json, pictures: str = 'pictures') -> str:
         parts += ['## Run time', '',
                   f'Median {time["median"]:.1f} s, quartiles {time["lower_quartile"]:.1f} to '
                   f'{time["upper_quartile"]:.1f} s, longest {time["longest"]:.1f} s for one case '
-                  f'on one core (process start and report included).', '']
+                  f'on one core (process start included, report and pictures left out).', '']
     return '\n'.join(parts)
 
 

@@ -1,0 +1,95 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Put scored candidates into a fitted model and refit everything, one task each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from lg_husky_sim.diagnosis.candidates import Candidate, neutral
+from lg_husky_sim.diagnosis.fits import extras_of, Fit, fit_structure
+from lg_husky_sim.diagnosis.screening import Score, Signature, signatures_of
+from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.identification.noise import Metric
+from lg_husky_sim.identification.problem import Observations
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """A candidate to be looked at on top of a fit: arguments of :func:`look`."""
+
+    candidate: Candidate
+    base: Fit
+    observations: Observations
+
+
+def look(task: Looked) -> list[Signature]:
+    """Return the signatures of a candidate on top of a fit."""
+    base = task.base
+    return signatures_of(task.candidate, base.structure, base.parameters, extras_of(base),
+                         task.observations, base.solution.predicted)
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A candidate to be refitted: arguments of :func:`refit`."""
+
+    observations: Observations
+    base: Fit
+    nominal: Parameters
+    score: Score
+    metric: Metric
+    steps: int = 2
+    start: Fit | None = None
+
+
+def run_refit(task: Refit) -> Fit | None:
+    """Return what :func:`refit` does with a task."""
+    return refit(task.observations, task.base, task.nominal, task.score, task.metric,
+                 task.steps, task.start)
+
+
+def _sized(score: Score) -> dict[str, float]:
+    # Values of an effect's parameters from a score's multiples.
+    candidate = score.signature.candidate
+    start = dict(score.signature.start)
+    if candidate.signed:
+        return {name: neutral(name) + float(np.clip(size, -8.0, 8.0)) * (value - neutral(name))
+                for (name, value), size in zip(start.items(), score.size, strict=True)}
+    return start
+
+
+def refit(observations: Observations, base: Fit, nominal: Parameters, score: Score,
+          metric_: Metric, steps: int = 2, start: Fit | None = None) -> Fit | None:
+    """
+    Put a scored candidate into the base and refit everything.
+
+    Parameters
+    ----------
+    observations : Observations
+    base : Fit
+    nominal : Parameters
+    score : Score
+    metric_ : Metric
+    steps : int
+    start : Fit, optional
+        Where an earlier, shorter refit of the same candidate ended; it is then polished.
+
+    Returns
+    -------
+    Fit or None
+    """
+    effect = replace(score.signature.candidate.effect, late=score.onset is not None)
+    try:
+        structure = base.structure.with_effect(effect, score.onset)
+    except LgHuskyError:
+        return None
+    sized = _sized(score)
+    sizes = {**{name: base.parameters[name] for e in base.structure.effects
+                for name in (p.name for p in e.parameters())}, **sized}
+    begin = {**base.solution.values, **sized} if start is None else dict(start.solution.values)
+    near = base if start is None else None
+    return fit_structure(observations, structure, nominal, metric_, begin, sizes, steps,
+                         near, polish=start is not None)
