@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.alike import with_common_errors
 from lg_husky_sim.diagnosis.candidates import effect_entries
-from lg_husky_sim.diagnosis.change import closed_base
+from lg_husky_sim.diagnosis.closed_base import closed_base
 from lg_husky_sim.diagnosis.diagnose import Case, diagnose
 from lg_husky_sim.diagnosis.fits import recalibrate
 from lg_husky_sim.diagnosis.result import Verdict

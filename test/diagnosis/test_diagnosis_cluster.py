@@ -31,6 +31,6 @@ def test_a_scheduler_that_does_not_answer_is_one_line(
         drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip('distributed', reason='Dask is not installed')
     monkeypatch.setattr('lg_husky_sim.identification.executor.PATIENCE', 0.2)
-    with pytest.raises(FitError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
+    with pytest.raises(FitError, match=r"no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         diagnose([drive('ahead', 'nothing', 1)], load_model(), lambda text, share: None,
                  workers=Workers(scheduler='tcp://127.0.0.1:9'))

@@ -1,0 +1,149 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A base as sold: it delays the command, limits its change and closes a wheel-speed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.evidence import energy
+from lg_husky_sim.diagnosis.fits import first_metric, Fit, fit_structure, recalibrate
+from lg_husky_sim.diagnosis.workers import HERE, Workers
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model import Structure
+from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.identification.problem import Observations
+
+#: What a base that closes a speed loop has: all of it is tried at once, since each alone is found
+#: in the guise of another.
+BASE = (Effect('command_latency'), Effect('command_slew', shape='both'), Effect('speed_loop'))
+#: Values of the same to begin from: a quick base and a slow one.
+STARTS: tuple[Mapping[str, float], ...] = (
+    {'latency': 0.05, 'slew_forward': 2.5, 'slew_yaw': 5.0, 'loop_lag': 0.1, 'loop_gain': 0.5,
+     'loop_integral': 20.0},
+    {'latency': 0.12, 'slew_forward': 1.0, 'slew_yaw': 2.0, 'loop_lag': 0.25, 'loop_gain': 0.5,
+     'loop_integral': 20.0},
+    {'latency': 0.12, 'slew_forward': 8.0, 'slew_yaw': 16.0, 'loop_lag': 0.25, 'loop_gain': 1.0,
+     'loop_integral': 4.0})
+#: A loop hides the dampings, so that their nominal values say little: factor on them to begin.
+DAMPED = 5.0
+#: Energy that numbers from all recordings may leave more in the earlier ones.
+AS_GOOD = 1.01
+#: Refits under scales that are taken anew.
+AGAIN = 2
+#: The same is kept if it leaves less than this part of what the plain robot leaves.
+CLEARLY = 0.5
+
+
+def closed_base(observations: Observations, structure: Structure, nominal: Parameters,
+                workers: Workers = HERE) -> Fit | None:
+    """
+    Fit a base that delays, limits and follows the command in a speed loop.
+
+    Parameters
+    ----------
+    observations : Observations
+    structure : Structure
+        Of the model in doubt.
+    nominal : Parameters
+    workers : Workers
+
+    Returns
+    -------
+    Fit or None
+        None where that is no clear improvement.
+    """
+    plain = recalibrate(observations, structure, nominal)
+    lacking = [e for e in BASE if all(e.id != there.id for there in structure.effects)]
+    whole = structure
+    for effect in lacking:
+        whole = whole.with_effect(effect)
+    tasks = []
+    for start in STARTS:
+        given = nominal.with_entries(*(
+            p for effect in lacking for p in effect_entries(effect, start)))
+        sizes = {name: given[name] for name in given}
+        begin = {**sizes, **{name: DAMPED * sizes[name] for name in (
+            'wheel_damping', 'yaw_damping')}}
+        tasks.append(Begun(observations, whole, given, begin, plain))
+    usable = [fit for fit in workers.map(fitted, tasks) if fit is not None]
+    if not usable:
+        return None
+    metric = first_metric(observations, usable[0].solution.predicted)
+    best = min(usable, key=lambda fit: energy(observations, fit, metric))
+    for start in STARTS:
+        # Where the fit without a limit is good, none is found from there: put one in.
+        limited = {name: start[name] for name in ('slew_forward', 'slew_yaw')}
+        given = nominal.with_entries(*(
+            p for effect in lacking for p in effect_entries(effect, start)))
+        again = fitted(Begun(observations, whole, given, {**best.solution.values, **limited},
+                             best))
+        if again is not None and energy(observations, again, metric) < energy(
+                observations, best, metric):
+            best = again
+    if energy(observations, best, metric) > CLEARLY * energy(observations, plain, metric):
+        return None
+    return recalibrate(observations, whole, nominal, best)
+
+
+def as_in_all(before: Observations, whole: Observations, fit: Fit, nominal: ModelFile,
+              workers: Workers = HERE) -> Fit:
+    """
+    Take what all recordings say of a base, if it explains the earlier ones as well.
+
+    The earlier ones alone may leave open which of two numbers it is.
+
+    Parameters
+    ----------
+    before, whole : Observations
+        The earlier recordings, and all.
+    fit : Fit
+        Of the earlier ones, by :func:`closed_base`.
+    nominal : ModelFile
+    workers : Workers
+
+    Returns
+    -------
+    Fit
+        Of the earlier ones.
+    """
+    everywhere = closed_base(whole, nominal.structure, nominal.parameters, workers)
+    if everywhere is None:
+        return fit
+    given = nominal.parameters.with_entries(*(
+        everywhere.parameters.entry(p.name) for e in everywhere.structure.effects
+        for p in e.parameters()))
+    again = fitted(Begun(before, everywhere.structure, given, everywhere.solution.values, fit))
+    metric = first_metric(before, fit.solution.predicted)
+    if again is None or energy(before, again, metric) > AS_GOOD * energy(before, fit, metric):
+        return fit
+    return recalibrate(before, again.structure, nominal.parameters, again)
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A fit that begins somewhere: arguments of :func:`fitted`."""
+
+    observations: Observations
+    structure: Structure
+    parameters: Parameters
+    begin: Mapping[str, float]
+    near: Fit
+
+
+def fitted(task: Begun) -> Fit | None:
+    """Refit under scales that are taken anew each time; the first are those of a fit nearby."""
+    fit: Fit | None = task.near
+    begin, sizes = task.begin, {name: task.parameters[name] for name in task.parameters}
+    for _ in range(1 + AGAIN):
+        if fit is None:
+            break
+        metric = first_metric(task.observations, fit.solution.predicted)
+        fit = fit_structure(task.observations, task.structure, task.parameters, metric, begin,
+                            sizes, 8, polish=False)
+        if fit is not None:
+            begin = fit.solution.values
+    return fit
