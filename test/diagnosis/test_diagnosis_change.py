@@ -55,10 +55,10 @@ def driven(name: str, effects: Sizes, seed: int, backwards: bool = False,
     streams = {'command': made[1]['command']}
     for stream, deviation in NOISE.items():
         early, late = (each[stream] for each in made)
-        values = late.values if since is None else np.where(
+        read = late.values if since is None else np.where(
             late.times[:, None] < since, early.values, late.values)
         streams[stream] = TimeSeries(
-            late.times, values + deviation * rng.standard_normal(values.shape), late.names)
+            late.times, read + deviation * rng.standard_normal(read.shape), late.names)
     return Recording(name, name, streams, 0, frames=('odom', 'base_link'))
 
 
