@@ -16,14 +16,14 @@ import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-import argparse  # noqa: E402
+import argparse
 
-from lg_husky_sim.diagnosis.diagnose import diagnose  # noqa: E402
-from lg_husky_sim.diagnosis.held_out import errors, plant_of  # noqa: E402
-from lg_husky_sim.diagnosis.workers import Workers  # noqa: E402
-from lg_husky_sim.husky.model import compile_model  # noqa: E402
-from lg_husky_sim.husky.model_file import load_model  # noqa: E402
-from lg_husky_sim.recording import read_recording, Recording, segments  # noqa: E402
+from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.held_out import errors, plant_of
+from lg_husky_sim.diagnosis.workers import Workers
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import read_recording, Recording, segments
 
 
 def part(recording: Recording, start: float, end: float) -> Recording:
