@@ -12,22 +12,17 @@ that was allowed.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 import argparse
+import os
+from typing import TYPE_CHECKING
 
-from lg_husky_sim.diagnosis.diagnose import diagnose
-from lg_husky_sim.diagnosis.held_out import errors, plant_of
-from lg_husky_sim.diagnosis.workers import Workers
-from lg_husky_sim.husky.model import compile_model
-from lg_husky_sim.husky.model_file import load_model
-from lg_husky_sim.recording import read_recording, Recording, segments
+if TYPE_CHECKING:
+    from lg_husky_sim.recording import Recording
 
 
 def part(recording: Recording, start: float, end: float) -> Recording:
     """Return a stretch of a recording, still on its clock."""
+    from lg_husky_sim.recording import Recording
     streams = {name: series.slice(start, end) for name, series in recording.streams.items()}
     return Recording(recording.name, recording.path,
                      {name: series for name, series in streams.items() if len(series)},
@@ -40,6 +35,14 @@ def main() -> None:
     parser.add_argument('recordings', nargs='+')
     parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1)
     given = parser.parse_args()
+    # Many small matrices: threads of the linear algebra cost more than they bring.
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    from lg_husky_sim.diagnosis.diagnose import diagnose
+    from lg_husky_sim.diagnosis.held_out import errors, plant_of
+    from lg_husky_sim.diagnosis.workers import Workers
+    from lg_husky_sim.husky.model import compile_model
+    from lg_husky_sim.husky.model_file import load_model
+    from lg_husky_sim.recording import read_recording, segments
     nominal = load_model()
     for path in given.recordings:
         recording = read_recording(path)

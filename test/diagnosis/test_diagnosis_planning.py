@@ -9,6 +9,8 @@ from typing import Any
 
 from lg_husky_sim.cli.main import run
 from lg_husky_sim.diagnosis.planning import drives, imitated, named_drive, plan, typical
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.manoeuvres import load_manoeuvre
 import numpy as np
@@ -75,3 +77,14 @@ def test_bad_input_is_one_line(arguments: list[str], message: str, tmp_path: Pat
     assert text.count('\n') == 1
     assert message in text
     assert not (tmp_path / 's.yaml').exists()
+
+
+def test_an_effect_that_is_there_is_taken_with_other_numbers() -> None:
+    model = load_model()
+    effect = Effect('command_latency')
+    structure = model.structure.with_effect(effect)
+    parameters = model.parameters.with_entries(*(p.parameter(0.1) for p in effect.parameters()))
+    found = typical('command_latency', structure, parameters)
+    assert found.structure.effects[-1].again
+    plant = compile_model(found.structure).at(found.parameters)
+    assert plant.sets[0].command.latency == found.parameters['latency_later'] != 0.1
