@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+import math
 
 from lg_husky_sim.diagnosis.candidates import (
     effect_entries,
@@ -80,6 +81,20 @@ def fit_structure(observations: Observations, structure: Structure, nominal: Par
     Fit or None
         None where it cannot be evaluated.
     """
+    problem = _problem(observations, structure, nominal, metric_, start, effects)
+    if problem is None:
+        return None
+    known = None if near is None else _columns(near, problem.unknowns)
+    solution = solve(problem, {**effects, **start}, steps=steps, known=known, polish=polish)
+    if solution is None:
+        return None
+    inner = {u.name: solution.values[u.name] for u in problem.unknowns if not u.extra}
+    return Fit(structure, problem.parameters.replacing(inner), solution)
+
+
+def _problem(observations: Observations, structure: Structure, nominal: Parameters,
+             metric_: Metric, start: Mapping[str, float], effects: Mapping[str, float]
+             ) -> Problem | None:
     unknowns: list[Unknown] = list(nuisance(nominal, structure, observations.channels))
     entries: list[Parameter] = []
     for effect in structure.effects:
@@ -90,14 +105,33 @@ def fit_structure(observations: Observations, structure: Structure, nominal: Par
         model = compile_model(structure)
     except LgHuskyError:
         return None
-    parameters = nominal.with_entries(*entries)
-    problem = Problem(observations, model, parameters, metric_, unknowns)
-    known = None if near is None else _columns(near, unknowns)
-    solution = solve(problem, {**effects, **start}, steps=steps, known=known, polish=polish)
-    if solution is None:
-        return None
-    inner = {u.name: solution.values[u.name] for u in unknowns if not u.extra}
-    return Fit(structure, parameters.replacing(inner), solution)
+    return Problem(observations, model, nominal.with_entries(*entries), metric_, unknowns)
+
+
+def cost_at(observations: Observations, structure: Structure, nominal: Parameters,
+            metric_: Metric, start: Mapping[str, float], effects: Mapping[str, float]) -> float:
+    """
+    Return what a fit would begin with.
+
+    Parameters
+    ----------
+    observations, structure, nominal, metric_, start, effects
+        As in :func:`fit_structure`.
+
+    Returns
+    -------
+    float
+        Half the sum of squares, priors included [nats]; infinite where the model cannot be
+        evaluated.
+    """
+    problem = _problem(observations, structure, nominal, metric_, start, effects)
+    if problem is None:
+        return math.inf
+    varied = problem.start({**effects, **start})
+    varied = np.array([u.varied(u.value(float(v))) for u, v in zip(
+        problem.unknowns, varied, strict=True)])
+    predicted = problem.predict(varied)
+    return math.inf if predicted is None else problem.cost(predicted, varied)[0]
 
 
 def _columns(near: Fit, unknowns: Sequence[Unknown]) -> FloatArray:

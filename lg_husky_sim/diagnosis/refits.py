@@ -7,13 +7,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.candidates import Candidate, neutral
-from lg_husky_sim.diagnosis.fits import extras_of, Fit, fit_structure
+from lg_husky_sim.diagnosis.fits import cost_at, extras_of, Fit, fit_structure
 from lg_husky_sim.diagnosis.screening import Score, Signature, signatures_of
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
 import numpy as np
+
+#: Parts of a scored size that a refit may begin from.
+GENTLER = (1.0, 0.4, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +54,15 @@ def run_refit(task: Refit) -> Fit | None:
                  task.steps, task.start)
 
 
-def _sized(score: Score) -> dict[str, float]:
-    # Values of an effect's parameters from a score's multiples.
+def _sizes(score: Score) -> list[dict[str, float]]:
+    # Values of an effect's parameters to begin from: as scored, smaller, and the catalogue's.
     candidate = score.signature.candidate
     start = dict(score.signature.start)
-    if candidate.signed:
-        return {name: neutral(name) + float(np.clip(size, -8.0, 8.0)) * (value - neutral(name))
-                for (name, value), size in zip(start.items(), score.size, strict=True)}
-    return start
+    if not candidate.signed:
+        return [start, *(dict(other) for other in candidate.starts if dict(other) != start)]
+    return [{name: neutral(name) + part * float(np.clip(size, -8.0, 8.0)) * (
+        value - neutral(name)) for (name, value), size in zip(
+            start.items(), score.size, strict=True)} for part in GENTLER]
 
 
 def refit(observations: Observations, base: Fit, nominal: Parameters, score: Score,
@@ -86,10 +90,18 @@ def refit(observations: Observations, base: Fit, nominal: Parameters, score: Sco
         structure = base.structure.with_effect(effect, score.onset)
     except LgHuskyError:
         return None
-    sized = _sized(score)
-    sizes = {**{name: base.parameters[name] for e in base.structure.effects
-                for name in (p.name for p in e.parameters())}, **sized}
-    begin = {**base.solution.values, **sized} if start is None else dict(start.solution.values)
-    near = base if start is None else None
-    return fit_structure(observations, structure, nominal, metric_, begin, sizes, steps,
-                         near, polish=start is not None)
+    own = {name: base.parameters[name] for e in base.structure.effects
+           for name in (p.name for p in e.parameters())}
+    if start is not None:
+        sizes = {**own, **_sizes(score)[0]}
+        return fit_structure(observations, structure, nominal, metric_,
+                             dict(start.solution.values), sizes, steps)
+    # The signature is a straight line through a bent world: begin where it is really best.
+    tried = []
+    for sized in _sizes(score):
+        begin = {**base.solution.values, **sized}
+        tried.append((cost_at(observations, structure, nominal, metric_, begin,
+                              {**own, **sized}), begin, {**own, **sized}))
+    _, begin, sizes = min(tried, key=lambda one: one[0])
+    return fit_structure(observations, structure, nominal, metric_, begin, sizes, steps, base,
+                         polish=False)

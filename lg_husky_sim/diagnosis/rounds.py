@@ -191,15 +191,17 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
                      energy(observations, rebased, common) / count)
     best = min(usable, key=lambda pair: pair[1].solution.cost)[1]
     final = shared_metric(observations, best, [])
+    usable = rescued(observations, base, nominal, usable, final, rebased, workers)
+    closest = min(usable, key=lambda pair: _left(observations, pair[1], final))[1]
+    if closest is not best:
+        final = shared_metric(observations, closest, [])
     cost_base = held_out_cost(observations, rebased, final, folds)
     rivals = []
     for score, fit in usable:
         cost = held_out_cost(observations, fit, final, folds)
-        white = [0.5 * float(np.sum(final.whiten(
-            observations, observations.measured - f.solution.predicted) ** 2))
-            for f in (rebased, fit)]
-        rivals.append(Rival(fit.structure.effects[-1], score.onset, fit,
-                            white[0] - white[1], float(np.sum(cost_base - cost))))
+        gain = _left(observations, rebased, final) - _left(observations, fit, final)
+        rivals.append(Rival(fit.structure.effects[-1], score.onset, fit, gain,
+                            float(np.sum(cost_base - cost))))
     rivals.sort(key=lambda r: -_rank(r))
     before = energy(observations, rebased, final)
     after = energy(observations, rivals[0].fit, final)
@@ -211,6 +213,50 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     adopted = (rivals[0].held_out > LEAST_GAIN[0] and unstable < UNSTABLE and share > 0.0
                if eager else _adopts(rivals[0], share, unstable, rest, number, only_late))
     return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted, unstable, rest)
+
+
+def _left(observations: Observations, fit: Fit, metric_: Metric) -> float:
+    white = metric_.whiten(observations, observations.measured - fit.solution.predicted)
+    return 0.5 * float(white @ white)
+
+
+def rescued(observations: Observations, base: Fit, nominal: Parameters,
+            usable: Sequence[tuple[Score, Fit]], metric_: Metric, rebased: Fit,
+            workers: Workers) -> list[tuple[Score, Fit]]:
+    """
+    Refit those that are worse than without their effect under the metric that judges them.
+
+    The metric of the refits gives little weight to what no signature explains along a straight
+    line; a candidate whose world is bent there may end where the judging metric looks closely.
+
+    Parameters
+    ----------
+    observations : Observations
+    base : Fit
+    nominal : Parameters
+    usable : sequence of (Score, Fit)
+    metric_ : Metric
+        That judges.
+    rebased : Fit
+        Without any of them.
+    workers : Workers
+
+    Returns
+    -------
+    list of (Score, Fit)
+        In the same order.
+    """
+    without = _left(observations, rebased, metric_)
+    lost = [i for i, (_, fit) in enumerate(usable) if _left(
+        observations, fit, metric_) > without]
+    lean = {i: without_columns(usable[i][0]) for i in lost}
+    quick = workers.map(run_refit, [Refit(observations, base, nominal, lean[i], metric_, 3)
+                                    for i in lost])
+    started = [(i, fit) for i, fit in zip(lost, quick, strict=True) if fit is not None]
+    again = workers.map(run_refit, [Refit(observations, base, nominal, lean[i], metric_, 6, fit)
+                                    for i, fit in started])
+    better = {i: fit for (i, _), fit in zip(started, again, strict=True) if fit is not None}
+    return [(score, better.get(i, fit)) for i, (score, fit) in enumerate(usable)]
 
 
 def changes(scores: Sequence[Score], whole: Onsets) -> list[Score]:
