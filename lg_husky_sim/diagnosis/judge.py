@@ -25,7 +25,7 @@ import numpy as np
 #: Gain from which something is missing, whatever it is [nats].
 CERTAIN = 45.0
 #: The same for a change between recordings, where much else differs a little [nats].
-CERTAIN_CHANGE = 150.0
+CERTAIN_CHANGE = 250.0
 #: Way per wheel angle [m/rad] below which the ground does not push the robot: a twentieth of
 #: the smallest wheel.
 NO_GRIP = 0.015

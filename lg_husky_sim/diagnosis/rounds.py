@@ -34,7 +34,7 @@ POLISHED = 5
 #: The same where only a change is asked for: its refits have few unknowns.
 OF_CHANGES = (9, 6)
 #: Least held-out gain of an adopted effect, always there or late [nats].
-LEAST_GAIN = (26.0, 45.0)
+LEAST_GAIN = (50.0, 60.0)
 #: Least share of the unexplained energy that the first effect must explain, always there or
 #: late: where the rest is near the sensors' noise, and where much remains unexplained.
 LEAST_SHARE = (0.003, 0.02)
@@ -49,9 +49,9 @@ UNSTABLE = 0.35
 #: How much more a change must explain after it than in any recording before it.
 PLACEBO = 2.0
 #: Least share of the unexplained energy that a change between recordings must explain: with a
-#: moderate gain, with one above the number of nats that follows, and after another change.
+#: gain above the first and the second number of nats that follow, and after another change.
 CHANGE_SHARE = (0.15, 0.05, 0.5)
-CHANGE_GAIN = 100.0
+CHANGE_GAIN = (100.0, 250.0)
 #: What a late effect must gain more than the same one without an onset: nats and share.
 LATER = (12.0, 0.15)
 
@@ -323,8 +323,8 @@ def _adopts(best: Rival, share: float, unstable: float, rest: float, number: int
     if best.held_out < LEAST_GAIN[late] or unstable > UNSTABLE:
         return False
     if change:
-        return share > (CHANGE_SHARE[2] if number > 0 else
-                        CHANGE_SHARE[best.held_out > CHANGE_GAIN])
+        return best.held_out > CHANGE_GAIN[0] and share > (
+            CHANGE_SHARE[2] if number > 0 else CHANGE_SHARE[best.held_out > CHANGE_GAIN[1]])
     if number > 0:
         return share > FURTHER_SHARE or (
             best.held_out > FURTHER_GAIN[0] and share > FURTHER_GAIN[1] and rest < MUCH)

@@ -27,11 +27,14 @@ from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
+import numpy as np
 
 #: Most effects that are named.
 MOST = 3
 #: Loss per value below which an earlier effect is dropped again [nats].
 IDLE = 0.002
+#: Part of a change's gain that the same number in all recordings may miss.
+ALIKE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +104,8 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
     Search
     """
     plain = recalibrate(observations, structure, nominal, start)
-    base, rounds = plain, []
+    base, corrected = plain, 0
+    rounds: list[Round] = []
     folds = folds_of(observations)
     masks: tuple[Onsets, ...] = ()
     if change is None and onsets:
@@ -113,8 +117,16 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         if change is not None:
             masks = change_onsets(observations, change, base.structure.onset)
         progress(f'round {number + 1}: signatures and refits', number / (most + 1))
-        one = play_round(observations, base, nominal, pool, masks, folds, number,
+        one = play_round(observations, base, nominal, pool, masks, folds, number - corrected,
                          only_late=change is not None, eager=eager, workers=workers)
+        if one.adopted and one.rivals[0].effect.again and number < most:
+            common = as_before(observations, base, one, nominal)
+            if common is not None:
+                # The robot's number was wrong before, too: nothing has changed in it.
+                base, nominal = common
+                plain = plain if rounds else base
+                corrected += 1
+                continue
         rounds.append(one)
         if not one.adopted or number == most:
             break
@@ -124,6 +136,48 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         kept = set(base.structure.effects)
         rounds = [r for r in rounds if not r.adopted or _same(r, kept)]
     return Search(observations, plain, base, tuple(rounds), nominal, change)
+
+
+def as_before(observations: Observations, base: Fit, one: Round, nominal: Parameters
+              ) -> tuple[Fit, Parameters] | None:
+    """
+    Return the robot with another number in all recordings, if that is as good as a change of it.
+
+    Parameters
+    ----------
+    observations : Observations
+    base : Fit
+        Before the round.
+    one : Round
+        Whose best candidate is an effect that the robot has, with other numbers.
+    nominal : Parameters
+        Held numbers.
+
+    Returns
+    -------
+    Fit
+        Without a change.
+    Parameters
+        The numbers that are held from then on.
+    """
+    best = one.rivals[0]
+    later = {own: best.fit.parameters[name] for own, name in best.effect.renamed.items()}
+    free = nominal.with_entries(*(
+        replace(nominal.entry(name), tolerance=10.0) for name in later))
+    fit = fit_structure(observations, base.structure, free, one.metric,
+                        {**base.solution.values, **later}, {**base.parameters, **later}, 8)
+    if fit is None:
+        return None
+    left = [0.5 * float(np.sum(one.metric.whiten(
+        observations, observations.measured - f.solution.predicted) ** 2))
+        for f in (fit, best.fit)]
+    if left[0] - left[1] > ALIKE * best.gain:
+        return None
+    held = nominal.with_entries(*(
+        replace(fit.parameters.entry(name), tolerance=0.0) for name in later))
+    again = fit_structure(observations, base.structure, held, one.metric,
+                          fit.solution.values, {**fit.parameters}, 3)
+    return None if again is None else (again, held)
 
 
 def _same(one: Round, kept: set[Effect]) -> bool:
