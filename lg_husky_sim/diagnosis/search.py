@@ -127,8 +127,11 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
                 plain = plain if rounds else base
                 corrected += 1
                 continue
+        if number == most:
+            # No more are named: this round only says what would be next.
+            one = replace(one, adopted=False)
         rounds.append(one)
-        if not one.adopted or number == most:
+        if not one.adopted:
             break
         base = with_better_onset(observations, one.rivals[0].fit, nominal, one.metric,
                                  change)
