@@ -20,8 +20,8 @@ its figures.
 A generator that shares no code with the diagnosis hides physics in a robot, drives it,
 and publishes rosbags. The answers are sealed: the SHA-256 of each salted answer is written down
 before the first diagnosis (all of them together: `{seal}`). Then
-`lg_husky diagnose` is called as any user would call it, with the recordings and nothing
-else. Robots used for tuning have seeds below 10000, those reported here {first} to {last}.
+`lg_husky diagnose --no-report` is called as any user would call it, with the recordings and
+nothing else. Robots used for tuning have seeds below 10000, those reported here {first} to {last}.
 
 | world | what stands in for the real robot |
 | --- | --- |
