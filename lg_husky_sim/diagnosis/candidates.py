@@ -117,6 +117,11 @@ def changed_candidates(structure: Structure, parameters: Parameters) -> tuple[Ca
                 tried = min(max(now[p.name] + step, p.lower), p.upper)
                 if tried != now[p.name]:
                     starts.append({**{q.name: now[q.name] for q in free}, p.name: tried})
+        for k in range(max(len(p.starts) for p in free)):
+            # The catalogue's own sizes, all at once: what a new firmware or preset would do.
+            whole = {p.name: p.starts[min(k, len(p.starts) - 1)] for p in free}
+            if whole not in starts and whole != now:
+                starts.append(whole)
         found.append(Candidate(again, tuple(starts), False))
     return tuple(found)
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.evidence import energy
@@ -32,14 +32,16 @@ STARTS: tuple[Mapping[str, float], ...] = (
 DAMPED = 5.0
 #: Energy that numbers from all recordings may leave more in the earlier ones.
 AS_GOOD = 1.01
-#: Refits under scales that are taken anew.
-AGAIN = 2
+#: Refits under scales that are taken anew, and steps of each.
+AGAIN, STEPS = 2, 8
+#: Steps by which a start is judged.
+QUICK = 3
 #: The same is kept if it leaves less than this part of what the plain robot leaves.
 CLEARLY = 0.5
 
 
 def closed_base(observations: Observations, structure: Structure, nominal: Parameters,
-                workers: Workers = HERE) -> Fit | None:
+                workers: Workers = HERE, known: Fit | None = None) -> Fit | None:
     """
     Fit a base that delays, limits and follows the command in a speed loop.
 
@@ -50,6 +52,8 @@ def closed_base(observations: Observations, structure: Structure, nominal: Param
         Of the model in doubt.
     nominal : Parameters
     workers : Workers
+    known : Fit, optional
+        Such a base, fitted to some of the observations: the only start then.
 
     Returns
     -------
@@ -62,25 +66,34 @@ def closed_base(observations: Observations, structure: Structure, nominal: Param
     for effect in lacking:
         whole = whole.with_effect(effect)
     tasks = []
-    for start in STARTS:
+    for start in STARTS if known is None else ():
         given = nominal.with_entries(*(
             p for effect in lacking for p in effect_entries(effect, start)))
         sizes = {name: given[name] for name in given}
         begin = {**sizes, **{name: DAMPED * sizes[name] for name in (
             'wheel_damping', 'yaw_damping')}}
         tasks.append(Begun(observations, whole, given, begin, plain))
+    if known is not None:
+        given = nominal.with_entries(*(
+            known.parameters.entry(p.name) for e in lacking for p in e.parameters()))
+        tasks.append(Begun(observations, whole, given, known.solution.values, plain))
     usable = [fit for fit in workers.map(fitted, tasks) if fit is not None]
     if not usable:
         return None
     metric = first_metric(observations, usable[0].solution.predicted)
     best = min(usable, key=lambda fit: energy(observations, fit, metric))
+    tasks = []
     for start in STARTS:
         # Where the fit without a limit is good, none is found from there: put one in.
         limited = {name: start[name] for name in ('slew_forward', 'slew_yaw')}
         given = nominal.with_entries(*(
             p for effect in lacking for p in effect_entries(effect, start)))
-        again = fitted(Begun(observations, whole, given, {**best.solution.values, **limited},
-                             best))
+        tasks.append(Begun(observations, whole, given, {**best.solution.values, **limited},
+                           best, QUICK, 0))
+    quick = [(energy(observations, fit, metric), k) for k, fit in enumerate(
+        workers.map(fitted, tasks)) if fit is not None]
+    if quick:
+        again = fitted(replace(tasks[min(quick)[1]], steps=STEPS, again=AGAIN))
         if again is not None and energy(observations, again, metric) < energy(
                 observations, best, metric):
             best = again
@@ -110,7 +123,7 @@ def as_in_all(before: Observations, whole: Observations, fit: Fit, nominal: Mode
     Fit
         Of the earlier ones.
     """
-    everywhere = closed_base(whole, nominal.structure, nominal.parameters, workers)
+    everywhere = closed_base(whole, nominal.structure, nominal.parameters, workers, fit)
     if everywhere is None:
         return fit
     given = nominal.parameters.with_entries(*(
@@ -132,18 +145,20 @@ class Begun:
     parameters: Parameters
     begin: Mapping[str, float]
     near: Fit
+    steps: int = STEPS
+    again: int = AGAIN
 
 
 def fitted(task: Begun) -> Fit | None:
     """Refit under scales that are taken anew each time; the first are those of a fit nearby."""
     fit: Fit | None = task.near
     begin, sizes = task.begin, {name: task.parameters[name] for name in task.parameters}
-    for _ in range(1 + AGAIN):
+    for _ in range(1 + task.again):
         if fit is None:
             break
         metric = first_metric(task.observations, fit.solution.predicted)
         fit = fit_structure(task.observations, task.structure, task.parameters, metric, begin,
-                            sizes, 8, polish=False)
+                            sizes, task.steps, polish=False)
         if fit is not None:
             begin = fit.solution.values
     return fit

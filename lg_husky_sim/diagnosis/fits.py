@@ -27,6 +27,8 @@ import numpy as np
 
 #: Robust deviations from which an event that nothing explains loses weight.
 EVENT = 5.0
+#: Ridge on columns of unit length, against those that are alike.
+RIDGE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,6 +231,9 @@ def shared_metric(observations: Observations, fit: Fit, signatures: Sequence[Sig
     """
     Estimate the correlation on what neither a fit nor any signature explains.
 
+    A signature may be on in each recording as much as it likes: an effect that is there in some of
+    them only would otherwise pass for noise.
+
     Parameters
     ----------
     observations : Observations
@@ -243,15 +248,39 @@ def shared_metric(observations: Observations, fit: Fit, signatures: Sequence[Sig
     residual = observations.measured - predicted
     scale = scales(observations, residual, predicted)
     common = () if observations.common is None else (observations.common,)
-    columns = np.column_stack([fit.solution.jacobian, *common,
-                               *(s.columns for s in signatures)])
-    norms = np.sqrt(np.sum((columns * scale[:, None]) ** 2, axis=0))
-    columns = columns[:, norms > 1e-9] / norms[norms > 1e-9]
+    everywhere = _normed(np.column_stack([fit.solution.jacobian, *common]), scale)
+    own = _normed(np.column_stack([np.zeros((residual.size, 0)), *(
+        s.columns for s in signatures)]), scale)
     left = residual
     weighted = scale
     for _ in range(3):
-        inside = columns * weighted[:, None]
-        gram = inside.T @ inside + 1e-6 * np.eye(columns.shape[1])
-        left = residual - columns @ np.linalg.solve(gram, inside.T @ (residual * weighted))
+        left = _unexplained(observations, residual, weighted, everywhere, own)
         weighted = robust(observations, left, scale, EVENT)
-    return metric(observations, left, weighted)
+    return metric(observations, left, weighted, related=True)
+
+
+def _normed(columns: FloatArray, scale: FloatArray) -> FloatArray:
+    norms = np.sqrt(np.sum((columns * scale[:, None]) ** 2, axis=0))
+    normed: FloatArray = columns[:, norms > 1e-9] / norms[norms > 1e-9]
+    return normed
+
+
+def _unexplained(observations: Observations, residual: FloatArray, weights: FloatArray,
+                 everywhere: FloatArray, own: FloatArray) -> FloatArray:
+    # What is left of a residual: the columns of `everywhere` have one coefficient each, those
+    # of `own` another in each recording; the latter are eliminated first.
+    stacked = np.column_stack([everywhere, residual])
+    eliminated, back = np.empty_like(stacked), []
+    for rows in observations.rows_of_recordings:
+        part, inside = stacked[rows] * weights[rows, None], own[rows] * weights[rows, None]
+        gram = inside.T @ inside + RIDGE * np.eye(inside.shape[1])
+        onto = np.linalg.solve(gram, inside.T @ part)
+        eliminated[rows] = part - inside @ onto
+        back.append((rows, onto))
+    columns = eliminated[:, :-1]
+    gram = columns.T @ columns + RIDGE * np.eye(columns.shape[1])
+    sizes = np.linalg.solve(gram, columns.T @ eliminated[:, -1])
+    left = residual - everywhere @ sizes
+    for rows, onto in back:
+        left[rows] -= own[rows] @ (onto[:, -1] - onto[:, :-1] @ sizes)
+    return left

@@ -121,7 +121,7 @@ def refitted(fit: Fit, nominal: Parameters, train: Observations, metric: Metric)
         The given one where the refit cannot be evaluated.
     """
     white = first_metric(train, train.predict(plant_of(fit)))
-    weighted = replace(white, filters=metric.filters)
+    weighted = replace(white, filters=metric.filters, parts=metric.parts)
     sizes = {**fit.parameters, **fit.solution.values}
     again = fit_structure(train, fit.structure, nominal, weighted, fit.solution.values, sizes,
                           steps=4, polish=False)

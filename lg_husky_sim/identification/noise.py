@@ -14,8 +14,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.identification.relations import apart, coefficients
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -99,15 +101,18 @@ class Metric:
         One over the standard deviation; zero for values that are left out.
     filters : mapping of str to numpy.ndarray
         For each channel the taps [1, -a1, ...] divided by the innovations' deviation.
+    parts : mapping of str to mapping of str to float
+        What is taken off a channel of others that see the same motion.
     """
 
     scale: FloatArray
     filters: Mapping[str, FloatArray]
+    parts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     _shared: dict[int, Shared] = field(default_factory=dict, init=False, repr=False)
 
-    def __reduce__(self) -> tuple[type[Metric], tuple[FloatArray, Mapping[str, FloatArray]]]:
+    def __reduce__(self) -> tuple[type[Metric], tuple[Any, ...]]:
         """Leave out what was worked out for observations of this process."""
-        return Metric, (self.scale, dict(self.filters))
+        return Metric, (self.scale, dict(self.filters), dict(self.parts))
 
     def whiten(self, observations: Observations, values: FloatArray) -> FloatArray:
         """
@@ -131,7 +136,7 @@ class Metric:
 
     @cached_property
     def uncorrelated(self) -> Metric:
-        """The same scale without the correlation."""
+        """The same scale without the correlation, in time and between channels."""
         return Metric(self.scale, {name: np.ones(1) for name in self.filters})
 
     def shared(self, observations: Observations) -> Shared:
@@ -168,7 +173,8 @@ class Metric:
         numpy.ndarray
             Shape as given.
         """
-        scaled = values * (self.scale if values.ndim == 1 else self.scale[:, None])
+        scaled = apart(observations, self.parts, values) * (
+            self.scale if values.ndim == 1 else self.scale[:, None])
         white = np.empty_like(scaled)
         for one in observations.slices:
             part, taps = scaled[one.first:one.last], self.filters[one.channel]
@@ -281,7 +287,7 @@ def robust(observations: Observations, left: FloatArray, scale: FloatArray, limi
 
 
 def metric(observations: Observations, residual: FloatArray, scale: FloatArray,
-           order: int = ORDER) -> Metric:
+           order: int = ORDER, related: bool = False) -> Metric:
     """
     Estimate the correlation of a residual.
 
@@ -294,17 +300,21 @@ def metric(observations: Observations, residual: FloatArray, scale: FloatArray,
         As :func:`scales` gives it.
     order : int
         Of the autoregression.
+    related : bool
+        Whether errors of the motion that stand in several channels are taken off.
 
     Returns
     -------
     Metric
     """
+    parts = coefficients(observations, residual, scale) if related else {}
+    residual = apart(observations, parts, residual)
     filters = {}
     for name in observations.channels:
-        parts = [(residual * scale)[s.first:s.last] for s in observations.slices
-                 if s.channel == name]
-        filters[name] = _taps(parts, order)
-    return Metric(scale, filters)
+        scaled = [(residual * scale)[s.first:s.last] for s in observations.slices
+                  if s.channel == name]
+        filters[name] = _taps(scaled, order)
+    return Metric(scale, filters, parts)
 
 
 def _taps(parts: list[FloatArray], order: int) -> FloatArray:

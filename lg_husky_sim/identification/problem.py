@@ -214,6 +214,13 @@ class Observations:
         """Names of the recordings in their order."""
         return tuple(dict.fromkeys(piece.recording for piece in self.pieces))
 
+    @cached_property
+    def rows_of_recordings(self) -> tuple[NDArray[np.int64], ...]:
+        """Rows of the measurement vector that belong to each recording, in their order."""
+        return tuple(np.concatenate([
+            np.arange(s.first, s.last) for s in self.slices
+            if self.pieces[s.piece].recording == name]) for name in self.recordings)
+
     def plant_in(self, plant: Plant, recording: str) -> Plant:
         """Return a plant as it is in one of the recordings."""
         if plant.onset is None or plant.onset.recording not in self.recordings:

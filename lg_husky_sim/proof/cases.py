@@ -338,7 +338,7 @@ def generate(spec: Spec, name: str, out_dir: Path, answers_dir: Path,
                   sensors.publish(table, drive, senses, rng), clock * 10 ** 9)
         clock += int(drive.duration) + 15
     if spec.world != 'g1':
-        for index, drive in enumerate(manoeuvres.drive(spec.drive, rng)):
+        for index, drive in enumerate(manoeuvres.again(spec.drive, drives, rng)):
             table = run(hidden, drive, poses[0], None, rng, with_effect=False)
             write_bag(out_dir / name / 'baseline' / f'base{index + 1}',
                       sensors.publish(table, drive, _gaps(robot.senses, drive.duration, rng),

@@ -167,12 +167,24 @@ def drive(kind: str, rng: np.random.Generator) -> tuple[Manoeuvre, ...]:
     return tuple(script(name, rng, rate, ramp) for name in _CONTENT[kind])
 
 
+def again(kind: str, like: tuple[Manoeuvre, ...],
+          rng: np.random.Generator) -> tuple[Manoeuvre, ...]:
+    """Return another such set, by the robot and the driver of `like`."""
+    rate, ramp = _driver(like)
+    return tuple(script(name, rng, rate, ramp) for name in _CONTENT[kind])
+
+
 def held_out(kind: str, like: tuple[Manoeuvre, ...],
              rng: np.random.Generator) -> tuple[Manoeuvre, ...]:
     """Return two fresh manoeuvres of the same kind that no diagnosis sees."""
-    rate = 1.0 / float(like[0].times[1] - like[0].times[0])
-    steepest = max(float(np.abs(np.diff(m.commands, axis=0)).max()) for m in like) * rate
-    ramp = math.inf if steepest > 8.0 else steepest
+    rate, ramp = _driver(like)
     names = {'paper': ('s_bend', 'obstacle'), 'full': ('mix', 'obstacle'),
              'drive-like': ('steps',)}[kind]
     return tuple(script(name, rng, rate, ramp) for name in names)
+
+
+def _driver(like: tuple[Manoeuvre, ...]) -> tuple[float, float]:
+    """Return the rate [Hz] and the steepest change [m/s², rad/s²] of manoeuvres."""
+    rate = 1.0 / float(like[0].times[1] - like[0].times[0])
+    steepest = max(float(np.abs(np.diff(m.commands, axis=0)).max()) for m in like) * rate
+    return rate, math.inf if steepest > 8.0 else steepest
