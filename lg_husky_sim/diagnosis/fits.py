@@ -22,6 +22,7 @@ from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.identification.least_squares import Problem, Solution, solve, Unknown
 from lg_husky_sim.identification.noise import Metric, metric, robust, scales
 from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.identification.relations import rows_of_recordings
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -271,7 +272,7 @@ def _unexplained(observations: Observations, residual: FloatArray, weights: Floa
     # of `own` another in each recording; the latter are eliminated first.
     stacked = np.column_stack([everywhere, residual])
     eliminated, back = np.empty_like(stacked), []
-    for rows in observations.rows_of_recordings:
+    for rows in rows_of_recordings(observations):
         part, inside = stacked[rows] * weights[rows, None], own[rows] * weights[rows, None]
         gram = inside.T @ inside + RIDGE * np.eye(inside.shape[1])
         onto = np.linalg.solve(gram, inside.T @ part)

@@ -65,7 +65,8 @@ def is_near(rival: Rival, best: Rival) -> bool:
 def _is_given(search: Search) -> bool:
     onset, change = search.final.structure.onset, search.change
     return onset is not None and change is not None and (
-        onset.recording, onset.value) == (change.recording, change.value)
+        onset.kind, onset.recording, onset.value) == (
+        change.kind, change.recording, change.value)
 
 
 def _rivals(one: Round, named: Effect | None) -> tuple[Rivalry, ...]:

@@ -67,8 +67,10 @@ def refined_onset(observations: Observations, fit: Fit, metric: Metric,
     if onset is None:
         return None
     family = (time_onsets if onset.kind is OnsetKind.TIME else place_onsets)(observations)
-    coarse = [o for o, _ in family.onsets
-              if o.kind is onset.kind and bool(o.recording) == bool(onset.recording)]
+    named = onset.recording if onset.kind is not OnsetKind.TIME else ''
+    coarse = [replace(o, recording=named or o.recording) for o, _ in family.onsets
+              if o.kind is onset.kind]
+    coarse = [o for o in coarse if bool(o.recording) == bool(onset.recording)]
     if change is not None:
         first = observations.recordings.index(change.recording)
         coarse = [o for o in coarse if o.recording in observations.recordings[first:]]

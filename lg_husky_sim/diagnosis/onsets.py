@@ -109,8 +109,10 @@ def change_onsets(observations: Observations, change: Onset, found: Onset | None
     -------
     tuple of Onsets
         The beginning of the later recordings, or what was found; and, unless something was found,
-        moments inside them. Placebos are single earlier recordings.
+        moments inside them and places in them. Placebos are single earlier recordings.
     """
+    if found is not None and found.kind is not OnsetKind.TIME:
+        return (_later_places(observations, found.recording, found),)
     inside = time_onsets(observations)
     names = observations.recordings
     number = names.index(change.recording)
@@ -127,7 +129,36 @@ def change_onsets(observations: Observations, change: Onset, found: Onset | None
     later = tuple((onset, groups) for onset, groups in inside.onsets
                   if onset.recording in names[number:]
                   and (onset.recording != change.recording or onset.value > change.value))
-    return given, Onsets(inside.groups, inside.count, later, placebos)
+    return (given, Onsets(inside.groups, inside.count, later, placebos),
+            _later_places(observations, change.recording))
+
+
+def _later_places(observations: Observations, recording: str, found: Onset | None = None
+                  ) -> Onsets:
+    # Places that matter from a recording on: all that are tried, or the one that was found.
+    owner, x = _places(observations)
+    names = observations.recordings
+    number = names.index(recording)
+    known = x[np.isfinite(x) & (owner >= number)]
+    edges = _spaced(known) if known.size else np.zeros(0)
+    if found is not None:
+        edges = np.array([found.value])
+    elif edges.size == 0 or edges[-1] - edges[0] < 1.0:
+        return Onsets(np.zeros(x.size, dtype=np.int64), 1, ())
+    width = edges.size + 2
+    cell = np.where(np.isfinite(x), np.searchsorted(edges, x, side='right'), width - 1)
+    group_owner, group_cell = np.divmod(np.arange(width * len(names)), width)
+    placebos = tuple(group_owner == i for i in range(number))
+    tried: list[tuple[Onset, NDArray[np.bool_]]] = []
+    for i, edge in enumerate(edges):
+        sides = {OnsetKind.PLACE_ABOVE: (group_cell > i) & (group_cell < width - 1),
+                 OnsetKind.PLACE_BELOW: group_cell <= i}
+        tried.extend((Onset(kind, float(edge), recording), side & (group_owner >= number))
+                     for kind, side in sides.items() if found is None or kind is found.kind)
+    if found is not None:
+        tried = [(found, groups) for _, groups in tried]
+    return Onsets(owner * width + cell, width * len(names), tuple(tried), placebos,
+                  found is not None)
 
 
 def _spaced(known: FloatArray) -> FloatArray:

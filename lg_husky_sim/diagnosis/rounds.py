@@ -44,8 +44,9 @@ MUCH = 7.0
 #: The same for a further effect: share, or a smaller one with a large gain.
 FURTHER_SHARE = 0.2
 FURTHER_GAIN = (100.0, 0.06)
-#: Largest ratio of losses to gains over held-out blocks.
-UNSTABLE = 0.35
+#: Largest ratio of losses to gains over held-out blocks; of a change between recordings, where
+#: what the model gets wrong in both adds to the losses.
+UNSTABLE = (0.35, 0.45)
 #: How much more a change must explain after it than in any recording before it.
 PLACEBO = 2.0
 #: Least share of the unexplained energy that a change between recordings must explain: with a
@@ -210,7 +211,7 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     cost = held_out_cost(observations, rivals[0].fit, final, folds)
     unstable = instability(observations, cost_base - cost)
     rest = after / count
-    adopted = (rivals[0].held_out > LEAST_GAIN[0] and unstable < UNSTABLE and share > 0.0
+    adopted = (rivals[0].held_out > LEAST_GAIN[0] and unstable < UNSTABLE[0] and share > 0.0
                if eager else _adopts(rivals[0], share, unstable, rest, number, only_late))
     return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted, unstable, rest)
 
@@ -320,7 +321,7 @@ def _adopts(best: Rival, share: float, unstable: float, rest: float, number: int
     if all(found[p.name] == found.entry(p.name).lower == 0.0
            for p in best.effect.parameters() if not p.fixed):
         return False
-    if best.held_out < LEAST_GAIN[late] or unstable > UNSTABLE:
+    if best.held_out < LEAST_GAIN[late] or unstable > UNSTABLE[change]:
         return False
     if change:
         return best.held_out > CHANGE_GAIN[0] and share > (

@@ -53,7 +53,8 @@ class Onset:
         Time in a recording [s], or x in the world [m].
     recording : str
         Name of the recording in which a time onset lies: the effect is absent in earlier ones
-        and stays in later ones. Empty where it begins at that time in each.
+        and stays in later ones. Empty where it begins at that time in each. With a place, the
+        first recording in which the place matters; empty for all.
     earlier : tuple of str
         Names of the recordings that are known to be earlier.
     """

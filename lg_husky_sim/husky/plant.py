@@ -134,7 +134,7 @@ class Plant:
         Return the plant as it is in one recording.
 
         An effect that begins at a time in a named recording is absent in earlier recordings and
-        stays in all others.
+        stays in all others; one that begins at a place is absent in earlier recordings only.
 
         Parameters
         ----------
@@ -151,7 +151,10 @@ class Plant:
         onset = self.onset
         if onset is None or len(self.sets) < 2 or onset.recording in ('', name):
             return self
-        return Plant((self.sets[0 if name in (*earlier, *onset.earlier) else 1],), self.states)
+        before = name in (*earlier, *onset.earlier)
+        if onset.kind.value != 'time' and not before:
+            return self
+        return Plant((self.sets[0 if before else 1],), self.states)
 
     def observe(self, truth: TimeSeries) -> TimeSeries:
         """

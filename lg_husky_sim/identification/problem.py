@@ -202,24 +202,16 @@ class Observations:
         return np.concatenate(parts) if parts else np.zeros(0)
 
     def _regime(self, plant: Plant, recording: str) -> int:
-        # 0 in or without the onset's recording, -1 before it, 1 after it.
+        # 0 in or without the onset's recording, -1 before it, 1 after it; a place stays a place.
         if plant.onset is None or plant.onset.recording not in self.recordings:
             return 0
-        names = self.recordings
-        own, other = names.index(recording), names.index(plant.onset.recording)
-        return (own > other) - (own < other)
+        own, other = (self.recordings.index(n) for n in (recording, plant.onset.recording))
+        return -1 if own < other else int(own > other and plant.onset.kind.value == 'time')
 
     @cached_property
     def recordings(self) -> tuple[str, ...]:
         """Names of the recordings in their order."""
         return tuple(dict.fromkeys(piece.recording for piece in self.pieces))
-
-    @cached_property
-    def rows_of_recordings(self) -> tuple[NDArray[np.int64], ...]:
-        """Rows of the measurement vector that belong to each recording, in their order."""
-        return tuple(np.concatenate([
-            np.arange(s.first, s.last) for s in self.slices
-            if self.pieces[s.piece].recording == name]) for name in self.recordings)
 
     def plant_in(self, plant: Plant, recording: str) -> Plant:
         """Return a plant as it is in one of the recordings."""

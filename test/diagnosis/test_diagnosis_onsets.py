@@ -1,0 +1,114 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A place that matters only after a change: onsets to try, and the model with one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.onset_placing import refined_onset
+from lg_husky_sim.diagnosis.onsets import change_onsets
+from lg_husky_sim.diagnosis.fits import first_metric, Fit, fit_structure
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.identification.problem import Observations, observations
+from lg_husky_sim.recording import Recording, segments
+import numpy as np
+import pytest
+
+SLOPE = {'slope_x': 40.0, 'slope_y': 10.0}
+
+
+@pytest.fixture(scope='module')
+def data(drive: Callable[..., Recording]) -> Observations:
+    """Return two recordings before a change and two after it."""
+    made = [drive(f'{when}{i}', 'nothing', 2 * i + j, backwards=bool(i))
+            for j, when in enumerate(('before', 'after')) for i in (0, 1)]
+    return observations([s for one in made for s in segments(one)])
+
+
+def change(data: Observations) -> Onset:
+    """Return the beginning of the later recordings."""
+    return Onset(OnsetKind.TIME, data.pieces[2].start, 'after0')
+
+
+def owners(data: Observations) -> np.ndarray:
+    """Return the number of each value's recording."""
+    owner = np.zeros(data.measured.size, dtype=int)
+    for one in data.slices:
+        owner[one.first:one.last] = data.recordings.index(data.pieces[one.piece].recording)
+    return owner
+
+
+def test_places_are_tried_in_later_recordings_only(data: Observations) -> None:
+    given, times, places = change_onsets(data, change(data))
+    assert given.given and not times.given and not places.given
+    assert {o.kind for o, _ in places.onsets} == {OnsetKind.PLACE_ABOVE, OnsetKind.PLACE_BELOW}
+    owner = owners(data)
+    for onset, groups in places.onsets:
+        assert onset.recording == 'after0'
+        on = groups[places.groups]
+        assert not np.any(on & (owner < 2)) and np.any(on)
+    above, below = (next(g for o, g in places.onsets if o.kind is kind) for kind in (
+        OnsetKind.PLACE_ABOVE, OnsetKind.PLACE_BELOW))
+    assert not np.any(above & below)
+    assert len(places.placebos) == 2
+
+
+def test_a_further_effect_begins_at_the_place_that_was_found(data: Observations) -> None:
+    found = Onset(OnsetKind.PLACE_BELOW, 0.7, 'after0')
+    (only,) = change_onsets(data, change(data), found)
+    assert only.given and [o for o, _ in only.onsets] == [found]
+    on = only.onsets[0][1][only.groups]
+    assert np.any(on) and not np.any(on & (owners(data) < 2))
+
+
+def sloped(value: float) -> tuple[Fit, Onset]:
+    """Return an unfitted model with a slope beyond a place, after the change."""
+    model = load_model()
+    onset = Onset(OnsetKind.PLACE_ABOVE, value, 'after0')
+    effect = Effect('slope', late=True)
+    structure = model.structure.with_effect(effect, onset)
+    return Fit(structure, model.parameters.with_entries(*effect_entries(effect, SLOPE)),
+               None), onset  # type: ignore[arg-type]
+
+
+def test_a_place_changes_nothing_before_the_change_and_less_than_all_after_it(
+        data: Observations) -> None:
+    model = load_model()
+    plain = data.predict(compile_model(model.structure).at(model.parameters))
+    fit, onset = sloped(0.5)
+    plant = compile_model(fit.structure).at(fit.parameters)
+    here = data.predict(plant)
+    everywhere = data.predict(compile_model(replace(
+        fit.structure, onset=replace(onset, value=-50.0))).at(fit.parameters))
+    owner = owners(data)
+    assert np.array_equal(here[owner < 2], plain[owner < 2])
+    for late in (2, 3):
+        assert np.max(np.abs((here - plain)[owner == late])) > 0.01
+        assert np.max(np.abs((here - everywhere)[owner == late])) > 0.01
+    # Outside the recordings that are known: wherever the place is passed.
+    assert plant.in_recording('another') is plant
+    assert len(plant.in_recording('before0', ('before0',)).sets) == 1
+
+
+def test_the_place_is_found_finely(data: Observations) -> None:
+    fit, onset = sloped(1.0)
+    seen = data.predict(compile_model(fit.structure).at(fit.parameters))
+    exact = Observations(tuple(
+        replace(piece, channels=tuple(
+            replace(c, values=seen[s.first:s.last]) for c, s in zip(
+                piece.channels, [s for s in data.slices if s.piece == k], strict=True)))
+        for k, piece in enumerate(data.pieces)))
+    start = replace(fit.structure, onset=replace(onset, value=1.3))
+    values = {name: fit.parameters[name] for name in fit.parameters}
+    metric = first_metric(exact, seen)
+    begun = fit_structure(exact, start, fit.parameters, metric, values, values, 0, polish=False)
+    assert begun is not None
+    better = refined_onset(exact, begun, metric, change(exact))
+    assert better is not None and better.kind is OnsetKind.PLACE_ABOVE
+    assert better.recording == 'after0'
+    assert better.value == pytest.approx(1.0, abs=0.1)
