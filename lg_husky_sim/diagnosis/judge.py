@@ -13,7 +13,7 @@ from lg_husky_sim.diagnosis.doubts import belief, reading_gain
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.regimes import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
-from lg_husky_sim.diagnosis.rounds import Rival, Round
+from lg_husky_sim.diagnosis.rounds import CHANGE_SHARE, Rival, Round
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
@@ -157,7 +157,7 @@ def is_unnamed(search: Search, unnamed: Unnamed) -> bool:
     screened = first.scores[0].gain if first.scores else 0.0
     tried = max((r.held_out for r in first.rivals), default=0.0)
     if search.change is not None:
-        return tried > CERTAIN_CHANGE
+        return tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]
     return screened > CERTAIN or tried > CERTAIN or (
         unnamed.held_out > CERTAIN and unnamed.share > 0.0)
 

@@ -51,7 +51,7 @@ UNSTABLE = (0.35, 0.45)
 PLACEBO = 2.0
 #: Least share of the unexplained energy that a change between recordings must explain: with a
 #: gain above the first and the second number of nats that follow, and after another change.
-CHANGE_SHARE = (0.15, 0.05, 0.5)
+CHANGE_SHARE = (0.15, 0.06, 0.5)
 CHANGE_GAIN = (100.0, 250.0)
 #: What a late effect must gain more than the same one without an onset: nats and share.
 LATER = (12.0, 0.15)

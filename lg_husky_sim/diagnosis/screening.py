@@ -26,6 +26,7 @@ from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ class Score:
         Best multiples of the columns.
     onset : Onset or None
     placebo : float
-        Largest gain when it is on in a single recording before the onset instead [nats].
+        Largest further gain when it is also on in a single recording before the onset [nats].
     """
 
     signature: Signature
@@ -248,9 +249,36 @@ class Sums:
         tuple of float
             Best multiples.
         """
-        onto = self.onto[groups].sum(axis=0)
-        matrix = self.own[groups].sum(axis=0) - onto.T @ onto
-        along = self.along[groups].sum(axis=0)
+        return self._gain([groups], free_sign)
+
+    def beside(self, groups: NDArray[np.bool_], others: NDArray[np.bool_], free_sign: bool
+               ) -> float:
+        """
+        Return what the columns explain elsewhere, once they are on in some groups.
+
+        Parameters
+        ----------
+        groups : numpy.ndarray of bool, shape (n_groups,)
+            Where they are on.
+        others : numpy.ndarray of bool, shape (n_groups,)
+            Where they are on with other sizes as well.
+        free_sign : bool
+            Whether they may enter with a negative sign.
+
+        Returns
+        -------
+        float
+            Further drop of the half sum of squares [nats].
+        """
+        alone, both = (self._gain(sets, free_sign)[0] for sets in (
+            [groups], [groups, others]))
+        return max(both - alone, 0.0)
+
+    def _gain(self, sets: Sequence[NDArray[np.bool_] | slice], free_sign: bool
+              ) -> tuple[float, tuple[float, ...]]:
+        onto = np.hstack([self.onto[groups].sum(axis=0) for groups in sets])
+        matrix = block_diag(*(self.own[groups].sum(axis=0) for groups in sets)) - onto.T @ onto
+        along = np.concatenate([self.along[groups].sum(axis=0) for groups in sets])
         norms = np.sqrt(np.maximum(np.diag(matrix), 0.0))
         if not np.any(norms > 1e-6):
             return 0.0, tuple(0.0 for _ in norms)
@@ -303,10 +331,11 @@ def scan(projector: Projector, signatures: Sequence[Signature],
                 summed[id(family.groups)] = projector.sums(signature.columns, family.groups,
                                                            family.count)
             sums = summed[id(family.groups)]
-            placebo = max((sums.gain(groups, signature.free_sign)[0]
-                           for groups in family.placebos), default=0.0)
-            for onset, groups in family.onsets:
-                gain, size = sums.gain(groups, signature.free_sign)
-                offer(Score(signature, gain, size, onset, placebo),
-                      'given' if family.given else 'late')
+            tried = [(*sums.gain(groups, signature.free_sign), onset, groups)
+                     for onset, groups in family.onsets]
+            gain, size, onset, groups = max(tried, key=lambda one: one[0])
+            placebo = max((sums.beside(groups, other, signature.free_sign)
+                           for other in family.placebos), default=0.0)
+            offer(Score(signature, gain, size, onset, placebo),
+                  'given' if family.given else 'late')
     return sorted(best.values(), key=lambda s: -s.gain)

@@ -8,12 +8,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.fits import first_metric, Fit, fit_structure
 from lg_husky_sim.diagnosis.onset_placing import refined_onset
 from lg_husky_sim.diagnosis.onsets import change_onsets
-from lg_husky_sim.diagnosis.fits import first_metric, Fit, fit_structure
+from lg_husky_sim.diagnosis.screening import Projector
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.recording import Recording, segments
 import numpy as np
@@ -45,13 +47,16 @@ def owners(data: Observations) -> np.ndarray:
 
 def test_places_are_tried_in_later_recordings_only(data: Observations) -> None:
     given, times, places = change_onsets(data, change(data))
-    assert given.given and not times.given and not places.given
+    assert given.given
+    assert not times.given
+    assert not places.given
     assert {o.kind for o, _ in places.onsets} == {OnsetKind.PLACE_ABOVE, OnsetKind.PLACE_BELOW}
     owner = owners(data)
     for onset, groups in places.onsets:
         assert onset.recording == 'after0'
         on = groups[places.groups]
-        assert not np.any(on & (owner < 2)) and np.any(on)
+        assert not np.any(on & (owner < 2))
+        assert np.any(on)
     above, below = (next(g for o, g in places.onsets if o.kind is kind) for kind in (
         OnsetKind.PLACE_ABOVE, OnsetKind.PLACE_BELOW))
     assert not np.any(above & below)
@@ -61,9 +66,11 @@ def test_places_are_tried_in_later_recordings_only(data: Observations) -> None:
 def test_a_further_effect_begins_at_the_place_that_was_found(data: Observations) -> None:
     found = Onset(OnsetKind.PLACE_BELOW, 0.7, 'after0')
     (only,) = change_onsets(data, change(data), found)
-    assert only.given and [o for o, _ in only.onsets] == [found]
+    assert only.given
+    assert [o for o, _ in only.onsets] == [found]
     on = only.onsets[0][1][only.groups]
-    assert np.any(on) and not np.any(on & (owners(data) < 2))
+    assert np.any(on)
+    assert not np.any(on & (owners(data) < 2))
 
 
 def sloped(value: float) -> tuple[Fit, Onset]:
@@ -109,6 +116,27 @@ def test_the_place_is_found_finely(data: Observations) -> None:
     begun = fit_structure(exact, start, fit.parameters, metric, values, values, 0, polish=False)
     assert begun is not None
     better = refined_onset(exact, begun, metric, change(exact))
-    assert better is not None and better.kind is OnsetKind.PLACE_ABOVE
+    assert better is not None
+    assert better.kind is OnsetKind.PLACE_ABOVE
     assert better.recording == 'after0'
     assert better.value == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_change_is_no_model_error_mirrored(data: Observations) -> None:
+    # What is on after the change explains, turned round, much of it in one recording before.
+    draws = np.random.default_rng(1)
+    size = data.measured.size
+    owner = owners(data)
+    column = draws.standard_normal((size, 1))
+    everywhere = np.hstack([column, draws.standard_normal((size, 2))])
+    residual = np.where(owner >= 2, 0.5, 0.0) * column[:, 0] + 0.5 * draws.standard_normal(size)
+    metric = Metric(np.ones(size), {name: np.ones(1) for name in data.channels})
+    projector = Projector(data, metric, residual, everywhere, np.full(3, np.inf), np.zeros(3))
+    given = change_onsets(data, change(data))[0]
+    sums = projector.sums(column, given.groups, given.count)
+    after = given.onsets[0][1]
+    gain = sums.gain(after, True)[0]
+    alone = max(sums.gain(other, True)[0] for other in given.placebos)
+    beside = max(sums.beside(after, other, True) for other in given.placebos)
+    assert alone > 0.2 * gain
+    assert beside < 0.01 * gain
