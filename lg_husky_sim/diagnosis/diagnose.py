@@ -142,7 +142,8 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
     names = judge.findings(found)
     verdict = Verdict.KNOWN if names else Verdict.NOTHING_MISSING
     unnamed = None
-    if not names or found.rounds[-1].rest > MUCH:
+    if (not names or found.rounds[-1].rest > MUCH) and (
+            found.change is None or judge.is_unnamed(found, None)):
         unnamed = look_for_unnamed(whole, found.final)
     model = model_of(found.final, '; '.join(f.statement for f in names)
                      or 'recalibrated, nothing added', with_intervals(found, nominal.parameters))

@@ -261,7 +261,8 @@ def shared_metric(observations: Observations, fit: Fit, signatures: Sequence[Sig
 
 
 def _normed(columns: FloatArray, scale: FloatArray) -> FloatArray:
-    norms = np.sqrt(np.sum((columns * scale[:, None]) ** 2, axis=0))
+    scaled = columns * scale[:, None]
+    norms = np.sqrt(np.einsum('ij,ij->j', scaled, scaled))
     normed: FloatArray = columns[:, norms > 1e-9] / norms[norms > 1e-9]
     return normed
 

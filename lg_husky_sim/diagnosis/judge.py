@@ -137,7 +137,7 @@ def indistinguishable(search: Search) -> tuple[Indistinguishable, ...]:
     return tuple(found)
 
 
-def is_unnamed(search: Search, unnamed: Unnamed) -> bool:
+def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     """
     Return whether something is missing although nothing could be named.
 
@@ -145,8 +145,8 @@ def is_unnamed(search: Search, unnamed: Unnamed) -> bool:
     ----------
     search : Search
         That adopted nothing.
-    unnamed : Unnamed
-        What smooth descriptions explain.
+    unnamed : Unnamed or None
+        What smooth descriptions explain, if it was looked at; a change is judged without.
 
     Returns
     -------
@@ -159,7 +159,7 @@ def is_unnamed(search: Search, unnamed: Unnamed) -> bool:
     if search.change is not None:
         return tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]
     return screened > CERTAIN or tried > CERTAIN or (
-        unnamed.held_out > CERTAIN and unnamed.share > 0.0)
+        unnamed is not None and unnamed.held_out > CERTAIN and unnamed.share > 0.0)
 
 
 def rolls_without_moving(observations: Observations) -> bool:

@@ -195,21 +195,47 @@ class Projector:
         -------
         Sums
         """
-        white = self.metric.filtered(self.observations, columns)
-        k = white.shape[1]
-        onto = np.zeros((count, self.directions.shape[1], k))
-        own = np.zeros((count, k, k))
-        along = np.zeros((count, k))
+        return self.all_sums(self.metric.filtered(self.observations, columns),
+                             [slice(0, columns.shape[1])], groups, count)[0]
+
+    def all_sums(self, white: FloatArray, parts: Sequence[slice], groups: NDArray[np.int64],
+                 count: int) -> list[Sums]:
+        """
+        Return the same for many signatures at once.
+
+        Parameters
+        ----------
+        white : numpy.ndarray, shape (n_values, n_all)
+            Columns of all signatures, filtered.
+        parts : sequence of slice
+            Columns of each signature.
+        groups : numpy.ndarray of int64, shape (n_values,)
+            Number of each value's group.
+        count : int
+            How many groups there are.
+
+        Returns
+        -------
+        list of Sums
+            One for each part.
+        """
+        onto = np.zeros((count, self.directions.shape[1], white.shape[1]))
+        along = np.zeros((count, white.shape[1]))
+        own = [np.zeros((count, p.stop - p.start, p.stop - p.start)) for p in parts]
         order = np.argsort(groups, kind='stable')
         edges = np.searchsorted(groups[order], np.arange(count + 1))
+        white, target, directions = white[order], self.target[order], self.directions[order]
         for g in range(count):
-            rows = order[edges[g]:edges[g + 1]]
-            if rows.size:
-                part = white[rows]
-                onto[g] = self.directions[rows].T @ part
-                own[g] = part.T @ part
-                along[g] = part.T @ self.target[rows]
-        return Sums(onto, own, along)
+            rows = slice(edges[g], edges[g + 1])
+            if rows.stop > rows.start:
+                inside = white[rows]
+                onto[g] = directions[rows].T @ inside
+                along[g] = inside.T @ target[rows]
+                square = inside.T @ inside
+                for part, block in zip(parts, own, strict=True):
+                    block[g] = square[part, part]
+        return [Sums(onto[:, :, part], block, along[:, part])
+                for part, block in zip(parts, own, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,7 +303,8 @@ class Sums:
     def _gain(self, sets: Sequence[NDArray[np.bool_] | slice], free_sign: bool
               ) -> tuple[float, tuple[float, ...]]:
         onto = np.hstack([self.onto[groups].sum(axis=0) for groups in sets])
-        matrix = block_diag(*(self.own[groups].sum(axis=0) for groups in sets)) - onto.T @ onto
+        own = [self.own[groups].sum(axis=0) for groups in sets]
+        matrix = (own[0] if len(own) == 1 else block_diag(*own)) - onto.T @ onto
         along = np.concatenate([self.along[groups].sum(axis=0) for groups in sets])
         norms = np.sqrt(np.maximum(np.diag(matrix), 0.0))
         if not np.any(norms > 1e-6):
@@ -317,20 +344,27 @@ def scan(projector: Projector, signatures: Sequence[Signature],
         if key not in best or score.gain > best[key].gain:
             best[key] = score
 
+    if not signatures:
+        return []
+    white = projector.metric.filtered(projector.observations, np.hstack(
+        [s.columns for s in signatures]))
+    ends = np.cumsum([s.columns.shape[1] for s in signatures])
+    parts = [slice(int(end) - s.columns.shape[1], int(end)) for s, end in zip(
+        signatures, ends, strict=True)]
     whole = np.zeros(projector.size, dtype=np.int64)
-    for signature in signatures:
+    for signature, sums in zip(signatures, projector.all_sums(white, parts, whole, 1),
+                               strict=True):
         if not signature.candidate.effect.kind.needs_onset:
-            sums = projector.sums(signature.columns, whole, 1)
             gain, size = sums.gain(slice(None), signature.free_sign)
             offer(Score(signature, gain, size), 'always')
-        summed: dict[int, Sums] = {}
-        for family in onsets:
-            if not family.onsets:
-                continue
-            if id(family.groups) not in summed:
-                summed[id(family.groups)] = projector.sums(signature.columns, family.groups,
+    summed: dict[int, list[Sums]] = {}
+    for family in onsets:
+        if not family.onsets:
+            continue
+        if id(family.groups) not in summed:
+            summed[id(family.groups)] = projector.all_sums(white, parts, family.groups,
                                                            family.count)
-            sums = summed[id(family.groups)]
+        for signature, sums in zip(signatures, summed[id(family.groups)], strict=True):
             tried = [(*sums.gain(groups, signature.free_sign), onset, groups)
                      for onset, groups in family.onsets]
             gain, size, onset, groups = max(tried, key=lambda one: one[0])
