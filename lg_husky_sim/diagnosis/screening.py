@@ -178,30 +178,10 @@ class Projector:
         padding = np.zeros((self.basis.shape[0] - self.size, columns.shape[1]))
         return self._project(np.vstack([white, padding]))
 
-    def sums(self, columns: FloatArray, groups: NDArray[np.int64], count: int) -> Sums:
-        """
-        Return what :func:`best_gain` needs of columns, separately for groups of values.
-
-        Parameters
-        ----------
-        columns : numpy.ndarray, shape (n_values, k)
-            Not whitened.
-        groups : numpy.ndarray of int64, shape (n_values,)
-            Number of each value's group.
-        count : int
-            How many groups there are.
-
-        Returns
-        -------
-        Sums
-        """
-        return self.all_sums(self.metric.filtered(self.observations, columns),
-                             [slice(0, columns.shape[1])], groups, count)[0]
-
     def all_sums(self, white: FloatArray, parts: Sequence[slice], groups: NDArray[np.int64],
                  count: int) -> list[Sums]:
         """
-        Return the same for many signatures at once.
+        Return what :meth:`Sums.gain` needs of many signatures, separately for groups of values.
 
         Parameters
         ----------

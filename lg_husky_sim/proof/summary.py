@@ -73,7 +73,7 @@ def rates(cases: Sequence[Judgement]) -> tuple[Rate, ...]:
               lambda c: c.top1 or c.first in ('nothing', 'unknown')),
         _rate('singles: another effect named beside', [c for c in clear if c.top1],
               lambda c: c.extra > 0),
-        _rate('clean: something named (false alarm)', clean,
+        _rate('clean: named or called unknown (false alarm)', clean,
               lambda c: c.verdict in ('known', 'unknown'), 0.05, at_most=True),
         _rate('pairs: at least one right', pairs, lambda c: c.found >= 1, 0.90),
         _rate('pairs: both right', pairs, lambda c: c.found >= 2, 0.60),

@@ -133,7 +133,8 @@ def test_a_change_is_no_model_error_mirrored(data: Observations) -> None:
     metric = Metric(np.ones(size), {name: np.ones(1) for name in data.channels})
     projector = Projector(data, metric, residual, everywhere, np.full(3, np.inf), np.zeros(3))
     given = change_onsets(data, change(data))[0]
-    sums = projector.sums(column, given.groups, given.count)
+    (sums,) = projector.all_sums(metric.filtered(data, column), [slice(0, 1)], given.groups,
+                                 given.count)
     after = given.onsets[0][1]
     gain = sums.gain(after, True)[0]
     alone = max(sums.gain(other, True)[0] for other in given.placebos)

@@ -178,8 +178,8 @@ def test_the_summary_counts() -> None:
     rates = {rate['name']: rate for rate in result['rates']}
     assert rates['medium and strong: named right']['value'] == pytest.approx(2.0 / 3.0)
     assert rates['medium and strong: named right']['reached'] is False
-    assert rates['clean: something named (false alarm)']['value'] == 0.5
-    assert rates['clean: something named (false alarm)']['reached'] is False
+    assert rates['clean: named or called unknown (false alarm)']['value'] == 0.5
+    assert rates['clean: named or called unknown (false alarm)']['reached'] is False
     assert rates['pairs: at least one right']['reached'] is True
     assert rates['pairs: both right']['reached'] is False
     assert result['shares']['known effects, all'] == {
