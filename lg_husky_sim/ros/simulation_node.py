@@ -61,13 +61,15 @@ class SimNode(Node):
             self.diagnostics = Diagnostics(self)
         self.paused = self.settings.start_paused
         self._timer: Any = None
+        # Who waits for the first odometry expects the robot to answer from then on, and without
+        # machine code on disk compiling takes seconds.
+        self._warm_up()
         self._publish()
         self._live = LiveSettings(self, self.settings, self._apply)
         self._subscribe()
         self.stopped = False
         self.control = Control(self, self)
         self.standard = StandardControl(self, self)
-        self._warm_up()
         self._resume()
         if started is not None:
             took = time.monotonic() - started
@@ -85,7 +87,7 @@ class SimNode(Node):
             self._on_initial_pose, 10)
 
     def _warm_up(self) -> None:
-        # The first step compiles or loads machine code; better now than in the first period.
+        # The first step compiles or loads machine code.
         spare = Engine(self.settings)
         spare.step()
 

@@ -50,6 +50,18 @@ def test_first_odometry_comes_within_two_seconds(probe: Probe, start: Start) -> 
     assert min(took) < 2.0
 
 
+def test_steps_follow_the_first_odometry_at_once_with_nothing_compiled(
+        probe: Probe, start: Start, tmp_path: Path) -> None:
+    """Compiling the kernel comes before the first odometry, not between it and the second."""
+    odom = probe.listen('nav_msgs/msg/Odometry', '/cold/odom')
+    husky = start(environment={'NUMBA_CACHE_DIR': str(tmp_path)}, odometry_topic='/cold/odom')
+    husky.ready(odom)
+    first = time.monotonic()
+    assert probe.until(lambda: len(odom) >= 10)
+    assert time.monotonic() - first < 1.5
+    assert husky.node.stop() == 0
+
+
 def test_clearpath_preset_takes_stamped_commands_and_ignores_stale_ones(
         probe: Probe, start: Start) -> None:
     """T1, T7: the Jazzy robot's names, types, frames and covariances together."""
