@@ -50,6 +50,8 @@ class EditedNetwork:
         Entries of the sensor model (gyro_bias, ...).
     speed_loop : bool
         Whether the base closes a wheel-speed loop.
+    grip : expression
+        Factor on the limit of a tyre's force.
     """
 
     graph: LinearGraph
@@ -57,6 +59,7 @@ class EditedNetwork:
     command: Mapping[str, str] = field(default_factory=dict)
     sensors: Mapping[str, str] = field(default_factory=dict)
     speed_loop: bool = False
+    grip: str = ''
 
     def changing(self, command: Mapping[str, str] | None = None,
                  sensors: Mapping[str, str] | None = None) -> EditedNetwork:
@@ -90,11 +93,12 @@ class EditedNetwork:
         graph = self.graph.replacing(replace(winding, tail=node)).with_branches(source)
         return replace(self, graph=graph, laws={**self.laws, name: row})
 
-    def with_slip_torque(self, name: str, wheel: str, row: LawRow) -> EditedNetwork:
+    def with_slip_torque(self, name: str, wheel: str, row: LawRow, *others: str
+                         ) -> EditedNetwork:
         """Return this network with a modulated through-source beside a wheel's slip element."""
         slip = branch_of(self.graph, f'B_{wheel}')
         source = Branch(name, Kind.THROUGH_SOURCE, slip.domain, slip.tail, slip.head,
-                        characteristic=_characteristic(row, (f'omega(B_{wheel})',)))
+                        characteristic=_characteristic(row, (f'omega(B_{wheel})', *others)))
         return replace(self, graph=self.graph.with_branches(source),
                        laws={**self.laws, name: row})
 
@@ -119,6 +123,9 @@ def _element_of(graph: LinearGraph, name: str) -> Branch | TwoPort:
     return next(element for element in elements if element.name == name)
 
 
+#: Effects that give elements other values.
+CHANGES_VALUES = frozenset({'payload', 'terrain_change', 'viscous_asymmetry',
+                            'wheel_radius_mismatch'})
 _MOTORS = (('1', 'L', '2'), ('2', 'R', '1'))
 _WHEELS = {'left': ('FL', 'RL'), 'right': ('FR', 'RR')}
 _LETTER = {'left': ('L',), 'right': ('R',), 'both': ('L', 'R'), 'none': ('L', 'R')}
@@ -191,7 +198,11 @@ def _traction(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     if effect.id == 'traction_saturation':
         for wheel in (*_WHEELS['left'], *_WHEELS['right']):
             damping = branch_of(network.graph, f'B_{wheel}').value
-            row = LawRow(Law.SLIP_SATURATION, ('traction_torque', str(damping)))
+            if effect.shape == 'circle':
+                network = _with_circle(network, wheel, str(damping))
+                continue
+            row = LawRow(Law.SLIP_SATURATION,
+                         (f'traction_torque{network.grip}', str(damping)))
             network = network.with_slip_torque(f'T_slip_{wheel}', wheel, row)
         return network
     numbers = range(1, 5) if effect.side == 'left' else range(5, 9)
@@ -200,15 +211,40 @@ def _traction(network: EditedNetwork, effect: Effect) -> EditedNetwork:
             'wheel_radius', '(wheel_radius*(1+radius_change))') for n in numbers})
 
 
+def _with_circle(network: EditedNetwork, wheel: str, damping: str) -> EditedNetwork:
+    # Adhesion of a wheel, shared by its slip and by a quarter of the scrubbing, whose force acts
+    # half a wheelbase from the middle.
+    scrub, mass = f'({branch_of(network.graph, "B_H").value})/4', branch_of(network.graph, 'J_H')
+    arm, limit = '(wheelbase/(2*wheel_radius))', f'traction_torque{network.grip}'
+    row = LawRow(Law.FRICTION_CIRCLE, (limit, damping, f'{scrub}/{arm}'))
+    network = network.with_slip_torque(f'T_slip_{wheel}', wheel, row, 'omega(J_H)')
+    row = LawRow(Law.FRICTION_CIRCLE,
+                 (f'{limit}*{arm}', f'-{scrub}', f'({damping})*{arm}'))
+    return network.with_force(f'T_scrub_{wheel}', mass.domain, mass.tail, mass.head, row,
+                              ('omega(J_H)', f'omega(B_{wheel})'))
+
+
+def _ground(network: EditedNetwork, slip: str, yaw: str) -> dict[str, str]:
+    # Values of what the ground does to wheels and chassis, times a factor each.
+    changed = {f'B_{wheel}': f'({branch_of(network.graph, f"B_{wheel}").value})*{slip}'
+               for side in _WHEELS for wheel in _WHEELS[side]}
+    return changed | {'B_H': f'({branch_of(network.graph, "B_H").value})*{yaw}'}
+
+
 def _chassis(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     if effect.id == 'payload':
-        return network.with_values({'M_H': 'mass+payload_mass',
-                                    'J_H': 'yaw_inertia+payload_inertia'})
+        heavier = {'M_H': 'mass+payload_mass', 'J_H': 'yaw_inertia+payload_inertia'}
+        if effect.shape == 'ground':
+            weight = '(1+payload_mass/mass)'
+            heavier |= _ground(network, weight, weight)
+            network = replace(network, grip=f'{network.grip}*{weight}')
+        return network.with_values(heavier)
+    if effect.shape == 'grip':
+        return replace(network, grip=f'{network.grip}*(1+grip_change)')
     if effect.id == 'terrain_change':
-        changed = {f'B_{wheel}': f'({branch_of(network.graph, f"B_{wheel}").value})'
-                   '*(1+wheel_damping_change)' for side in _WHEELS for wheel in _WHEELS[side]}
-        changed['B_H'] = f'({branch_of(network.graph, "B_H").value})*(1+yaw_damping_change)'
-        return network.with_values(changed)
+        slip, scrub = '(1+wheel_damping_change)', '(1+yaw_damping_change)'
+        return replace(network.with_values(_ground(network, slip, scrub)),
+                       grip=f'{network.grip}*{scrub}')
     forward, yaw = 'v(M_H)', 'omega(J_H)'
     rows: dict[str, tuple[Law, tuple[Coefficient, ...], tuple[str, ...]]] = {
         'slope': (Law.HEADING, ('slope_x', 'slope_y'), ()),

@@ -181,14 +181,16 @@ class Effect:
 
     def parameters(self) -> tuple[EffectParameter, ...]:
         """Return the numbers that this side and shape have."""
-        unused = {('command_slew', 'forward'): 'slew_yaw',
-                  ('command_slew', 'yaw'): 'slew_forward',
-                  ('command_limit', 'forward'): 'limit_yaw',
-                  ('command_limit', 'yaw'): 'limit_forward',
-                  ('viscous_asymmetry', 'slip'): 'extra_damping',
-                  ('viscous_asymmetry', 'bearing'): 'damping_change',
-                  ('driver_deadband', 'zone'): 'dead_edge'}.get((self.id, self.shape))
-        own = tuple(p for p in self.kind.parameters if p.name != unused)
+        unused = {('command_slew', 'forward'): ('slew_yaw',),
+                  ('command_slew', 'yaw'): ('slew_forward',),
+                  ('command_limit', 'forward'): ('limit_yaw',),
+                  ('command_limit', 'yaw'): ('limit_forward',),
+                  ('viscous_asymmetry', 'slip'): ('extra_damping',),
+                  ('viscous_asymmetry', 'bearing'): ('damping_change',),
+                  ('terrain_change', 'damping'): ('grip_change',),
+                  ('terrain_change', 'grip'): ('wheel_damping_change', 'yaw_damping_change'),
+                  ('driver_deadband', 'zone'): ('dead_edge',)}.get((self.id, self.shape), ())
+        own = tuple(p for p in self.kind.parameters if p.name not in unused)
         return tuple(replace(p, name=p.name + LATER) for p in own) if self.again else own
 
     @property

@@ -72,6 +72,9 @@ class Law(enum.IntEnum):
     TABLE = 15
     """f = table over [p1, p2] with |p3| knots p4..., of context p0 >= 0 or of z0 if p0 < 0;
     straight between the knots, and periodic where p3 is negative."""
+    FRICTION_CIRCLE = 16
+    """f = ((1 + q^3)^(-1/3) - 1) p1 z0, q = sqrt((p1 z0)^2 + (p2 z1)^2)/p0: a damping p1 that
+    saturates together with another one, p2; nearly as the hyperbolic tangent does."""
 
 
 #: The laws as expressions of the linear graph: arguments z1, z2, ..., coefficients p0, p1, ...
@@ -93,6 +96,8 @@ EXPRESSIONS = {
     Law.HEATING: '-p0*heat*z1+0*p1+0*p2',
     Law.BACKLASH: '-p1*in_play*z3+0*p0+0*p2+0*z1+0*z2',
     Law.TABLE: 'table',
+    Law.FRICTION_CIRCLE: (
+        '(1/(1+(((p1*z1)**2+(p2*z2)**2)/p0**2)**1.5)**0.3333333333333333-1)*p1*z1'),
 }
 #: Names in the expressions that are signals, not parameters.
 SIGNALS = ('heading', 'angle', 'time', 'heat', 'in_play', 'table')
@@ -198,6 +203,10 @@ def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatA
             out[j] = p0 * math.cos(angle) + p1 * math.sin(angle)
         elif law == 6:
             out[j] = p0 * math.tanh(p1 * z[o] / p0) - p1 * z[o]
+        elif law == 16:
+            own, other = p1 * z[o], p2 * z[o + 1]
+            square = (own * own + other * other) / (p0 * p0)
+            out[j] = ((1.0 + square * math.sqrt(square)) ** (-1.0 / 3.0) - 1.0) * own
         elif law == 15:
             selector = int(p0)
             out[j] = _table(coefficients, c, j, z[o] if selector < 0 else context[selector])

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky import network
-from lg_husky_sim.husky.edits import branch_of, edit, EditedNetwork
+from lg_husky_sim.husky.edits import branch_of, CHANGES_VALUES, edit, EditedNetwork
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.laws import WIDTH
 from lg_husky_sim.husky.parameters import Parameters
@@ -85,8 +85,13 @@ class Structure:
         """
         graph = network.simplified() if self.drivetrain is Drivetrain.SIMPLIFIED else (
             network.expanded())
-        edited = EditedNetwork(graph)
-        for effect in self.in_force(late):
+        edited, there = EditedNetwork(graph), self.in_force(late)
+        if any(e.shape == 'grip' for e in there) and all(
+                e.id != 'traction_saturation' for e in there):
+            raise ParameterError('effect terrain_change of shape grip changes a limit of the '
+                                 'tyres; it needs traction_saturation')
+        # What changes values comes first: laws are written with the values that they find.
+        for effect in sorted(there, key=lambda e: e.id not in CHANGES_VALUES):
             edited = edit(edited, effect)
         return edited
 

@@ -9,6 +9,7 @@ import math
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import catalogue, descriptions, Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation import rollout
@@ -38,6 +39,7 @@ IDS = {
 
 ALL = [Effect(kind.id, side, shape) for kind in (*catalogue().values(), *descriptions().values())
        for side in kind.sides for shape in kind.shapes]
+CIRCLE = Effect('traction_saturation', shape='circle')
 STRAIGHT, TURN = (0.6, 0.0), (0.5, 0.4)
 
 
@@ -86,12 +88,13 @@ def test_unknown_ids_sides_and_shapes_are_refused() -> None:
 @pytest.mark.parametrize('effect', ALL, ids=name_of)
 def test_every_side_and_shape_drives_and_shows(robot: Maker, effect: Effect) -> None:
     """At the sizes from which an estimation starts: finite, and not the nominal robot."""
-    plant = robot(effect)
+    needed = (CIRCLE,) if effect.shape == 'grip' else ()
+    plant = robot(*needed, effect)
     run = driven(plant, *WANDER)
     seen = plant.observe(run)
     assert np.all(np.isfinite(seen.values))
     assert np.abs(seen.column('forward')).max() < 3.0
-    base = robot()
+    base = robot(*needed)
     changed = np.abs(seen.values - base.observe(driven(base, *WANDER)).values).max()
     assert changed > 1e-6, name_of(effect)
 
@@ -117,7 +120,8 @@ NEUTRAL: list[tuple[Effect, dict[str, float]]] = [
     (Effect('torque_ripple', 'both'), {'ripple_cos': 0.0, 'ripple_sin': 0.0}),
     *((Effect('wheel_radius_mismatch', side), {'radius_change': 0.0})
       for side in ('left', 'right')),
-    (Effect('payload'), {'payload_mass': 0.0, 'payload_inertia': 0.0}),
+    *((Effect('payload', shape=shape), {'payload_mass': 0.0, 'payload_inertia': 0.0})
+      for shape in ('chassis', 'ground')),
     (Effect('slope'), {'slope_x': 0.0, 'slope_y': 0.0}),
     (Effect('rolling_resistance'), {'rolling_force': 0.0}),
     (Effect('quadratic_drag'), {'drag': 0.0}),
@@ -150,6 +154,47 @@ def test_limits_without_an_exact_neutral_size_come_near_it(robot: Maker) -> None
             ('traction_saturation', {'traction_torque': 300.0}, 2e-4),
             ('belt_compliance', {'belt_stiffness': 1e6, 'belt_damping': 2.0}, 2e-2)):
         assert np.abs(driven(robot(effect, **values), *WANDER).values[:, 2:4] - base).max() < near
+
+
+def test_grip_is_shared_between_driving_and_scrubbing(robot: Maker) -> None:
+    """
+    Force of a wheel is along its slip, whatever the ground holds.
+
+    In a steady turn both the driving and the scrubbing forces therefore lose the same factor, and
+    the rate of turn does not depend on the grip; how soon it is reached does.
+    """
+    pivot = (0.0, 0.5)
+    tight = robot(CIRCLE, traction_torque=0.5)
+    assert last(tight, pivot, 'yaw_rate') == pytest.approx(
+        last(robot(), pivot, 'yaw_rate'), rel=0.03)
+    soon = [driven(r, pivot, each=0.3).column('yaw_rate')[5] for r in (robot(), tight)]
+    assert 0.0 < soon[1] < 0.7 * soon[0]
+    # Where the robot also turns, less is left to drive: the same limit along the wheels alone
+    # hinders a turn instead.
+    along = robot('traction_saturation', traction_torque=0.5)
+    assert last(along, pivot, 'yaw_rate') < 0.7 * last(tight, pivot, 'yaw_rate')
+
+
+def test_more_grip_undoes_a_limit(robot: Maker) -> None:
+    more = Effect('terrain_change', shape='grip')
+    changed = driven(robot(CIRCLE, more, traction_torque=1.0, grip_change=1.0), *WANDER)
+    twice = driven(robot(CIRCLE, traction_torque=2.0), *WANDER)
+    np.testing.assert_allclose(changed.values, twice.values, rtol=0, atol=1e-9)
+    with pytest.raises(ParameterError, match='grip .* needs traction_saturation'):
+        robot(more)
+
+
+def test_a_load_on_the_ground_scales_what_the_ground_does(robot: Maker) -> None:
+    """A payload as heavy as the robot doubles dampings and grip, whatever the order."""
+    load = Effect('payload', shape='ground')
+    mass = load_model().parameters['mass']
+    heavy = [driven(robot(*effects, payload_mass=mass, payload_inertia=0.0, traction_torque=1.0),
+                    *WANDER).values for effects in ((CIRCLE, load), (load, CIRCLE))]
+    numbers = {name: 2.0 * load_model().parameters[name] for name in (
+        'mass', 'wheel_damping', 'yaw_damping')}
+    same = driven(robot(CIRCLE, traction_torque=2.0, **numbers), *WANDER)
+    for values in heavy:
+        np.testing.assert_allclose(values, same.values, rtol=0, atol=1e-9)
 
 
 def test_the_others_are_covered() -> None:

@@ -26,6 +26,7 @@ LOSSES: tuple[tuple[Effect, ...], ...] = (
     (Effect('rolling_resistance'), Effect('yaw_scrub_coulomb'), Effect('quadratic_drag')),
     (Effect('yaw_scrub_speed'),),
     (Effect('traction_saturation'),),
+    (Effect('traction_saturation', shape='circle'), Effect('payload', shape='ground')),
     (Effect('motor_heating'),),
     (Effect('belt_compliance'), Effect('coulomb_drivetrain', 'both'),
      Effect('traction_saturation')),
