@@ -8,8 +8,14 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.alike import with_common_errors
-from lg_husky_sim.diagnosis.closed_base import as_in_all, closed_base
-from lg_husky_sim.diagnosis.fits import extras_of, first_metric, Fit, fit_structure
+from lg_husky_sim.diagnosis.closed_base import as_in_all, closed_base, with_adhesion
+from lg_husky_sim.diagnosis.fits import (
+    extras_of,
+    first_metric,
+    Fit,
+    fit_structure,
+    recalibrate,
+)
 from lg_husky_sim.diagnosis.held_out import plant_of
 from lg_husky_sim.diagnosis.search import Progress, Search, search
 from lg_husky_sim.diagnosis.workers import HERE, Workers
@@ -63,11 +69,15 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     progress('before the change: what the base closes', 0.0)
     start = closed_base(before, nominal.structure, nominal.parameters, workers)
     if start is not None:
-        start = as_in_all(before, whole, start, nominal, workers)
-    known = start or search(
-        before, nominal.structure, nominal.parameters,
-        lambda text, share: progress(f'before the change: {text}', 0.4 * share),
-        most=BEFORE, onsets=False, eager=True, workers=workers).final
+        closed = as_in_all(before, whole, start, nominal, workers)
+        known = with_adhesion(before, closed, nominal.parameters, workers)
+    else:
+        open_loop = recalibrate(before, nominal.structure, nominal.parameters)
+        tyred = with_adhesion(before, open_loop, nominal.parameters, workers)
+        known = search(
+            before, tyred.structure, nominal.parameters,
+            lambda text, share: progress(f'before the change: {text}', 0.4 * share),
+            most=BEFORE, onsets=False, start=tyred, eager=True, workers=workers).final
     first = next(piece for piece in whole.pieces if piece.recording not in baseline)
     onset = Onset(OnsetKind.TIME, first.start, first.recording)
     exact = known.parameters.with_entries(*(

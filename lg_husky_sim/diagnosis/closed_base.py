@@ -36,6 +36,10 @@ AS_GOOD = 1.01
 AGAIN, STEPS = 2, 8
 #: Steps by which a start is judged.
 QUICK = 3
+#: Tyres that share their grip between driving and scrubbing, limits to begin from [N·m], steps of
+#: their fit, and the part of the energy that they may leave to be kept.
+TYRES = Effect('traction_saturation', shape='circle')
+TYRE_STARTS, TYRE_STEPS, GRIP_SHOWS = (6.0, 20.0), 6, 0.99
 #: The same is kept if it leaves less than this part of what the plain robot leaves.
 CLEARLY = 0.5
 
@@ -134,6 +138,41 @@ def as_in_all(before: Observations, whole: Observations, fit: Fit, nominal: Mode
     if again is None or energy(before, again, metric) > AS_GOOD * energy(before, fit, metric):
         return fit
     return recalibrate(before, again.structure, nominal.parameters, again)
+
+
+def with_adhesion(observations: Observations, fit: Fit, nominal: Parameters,
+                  workers: Workers = HERE) -> Fit:
+    """
+    Give a base tyres whose grip is limited, if that explains its recordings better.
+
+    Parameters
+    ----------
+    observations : Observations
+    fit : Fit
+        By :func:`closed_base`.
+    nominal : Parameters
+    workers : Workers
+
+    Returns
+    -------
+    Fit
+        The same where the limit is out of reach.
+    """
+    if any(e.id == TYRES.id for e in fit.structure.effects):
+        return fit
+    structure = fit.structure.with_effect(TYRES)
+    name, = (p.name for p in TYRES.parameters())
+    known = {**{n: fit.parameters[n] for n in fit.parameters}, **fit.solution.values}
+    tasks = [Begun(observations, structure, nominal.with_entries(
+        *(fit.parameters.entry(p.name) for e in fit.structure.effects for p in e.parameters()),
+        *effect_entries(TYRES, {name: start})), {**known, name: start}, fit, TYRE_STEPS, 1)
+        for start in TYRE_STARTS]
+    metric = first_metric(observations, fit.solution.predicted)
+    tried = [one for one in workers.map(fitted, tasks) if one is not None]
+    best = min(tried, key=lambda one: energy(observations, one, metric), default=fit)
+    if energy(observations, best, metric) > GRIP_SHOWS * energy(observations, fit, metric):
+        return fit
+    return recalibrate(observations, structure, nominal, best)
 
 
 @dataclass(frozen=True, eq=False)

@@ -176,7 +176,7 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     polished = workers.map(run_refit, [
         Refit(observations, base, nominal, lean[k], common, 6, fit) for k, fit in near])
     fits = [(serious[k], fit) for (k, _), fit in zip(near, polished, strict=True)]
-    usable = [(score, fit) for score, fit in fits if fit is not None]
+    usable = [(score, fit) for score, fit in fits if fit is not None and not is_eased(fit)]
     rebased = fit_structure(observations, base.structure, nominal, common,
                             base.solution.values, base.parameters) or base
     if usable:
@@ -214,6 +214,13 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     adopted = (rivals[0].held_out > LEAST_GAIN[0] and unstable < UNSTABLE[0] and share > 0.0
                if eager else _adopts(rivals[0], share, unstable, rest, number, only_late))
     return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted, unstable, rest)
+
+
+def is_eased(fit: Fit) -> bool:
+    """Return whether the newest effect lets tyres grip better than before: that is a ground's."""
+    effect = fit.structure.effects[-1]
+    return effect.again and effect.id == 'traction_saturation' and any(
+        fit.parameters[later] > fit.parameters[own] for own, later in effect.renamed.items())
 
 
 def _left(observations: Observations, fit: Fit, metric_: Metric) -> float:

@@ -119,7 +119,7 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         progress(f'round {number + 1}: signatures and refits', number / (most + 1))
         one = play_round(observations, base, nominal, pool, masks, folds, number - corrected,
                          only_late=change is not None, eager=eager, workers=workers)
-        if one.adopted and one.rivals[0].effect.again and number < most:
+        if one.adopted and change is not None and number < most:
             common = as_before(observations, base, one, nominal)
             if common is not None:
                 # The robot's number was wrong before, too: nothing has changed in it.
@@ -144,7 +144,10 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
 def as_before(observations: Observations, base: Fit, one: Round, nominal: Parameters
               ) -> tuple[Fit, Parameters] | None:
     """
-    Return the robot with another number in all recordings, if that is as good as a change of it.
+    Return the robot with an effect in all recordings, if that is as good as a change.
+
+    The later recordings may go where the earlier ones never were: what shows there only may
+    have been so before.
 
     Parameters
     ----------
@@ -152,7 +155,7 @@ def as_before(observations: Observations, base: Fit, one: Round, nominal: Parame
     base : Fit
         Before the round.
     one : Round
-        Whose best candidate is an effect that the robot has, with other numbers.
+        Whose best candidate is a change: a new effect, or one with other numbers than before.
     nominal : Parameters
         Held numbers.
 
@@ -164,10 +167,15 @@ def as_before(observations: Observations, base: Fit, one: Round, nominal: Parame
         The numbers that are held from then on.
     """
     best = one.rivals[0]
+    structure, free = base.structure, nominal
     later = {own: best.fit.parameters[name] for own, name in best.effect.renamed.items()}
-    free = nominal.with_entries(*(
-        replace(nominal.entry(name), tolerance=10.0) for name in later))
-    fit = fit_structure(observations, base.structure, free, one.metric,
+    if later:
+        free = nominal.with_entries(*(
+            replace(nominal.entry(name), tolerance=10.0) for name in later))
+    else:
+        later = {p.name: best.fit.parameters[p.name] for p in best.effect.parameters()}
+        structure = structure.with_effect(replace(best.effect, late=False))
+    fit = fit_structure(observations, structure, free, one.metric,
                         {**base.solution.values, **later}, {**base.parameters, **later}, 8)
     if fit is None:
         return None
@@ -178,7 +186,7 @@ def as_before(observations: Observations, base: Fit, one: Round, nominal: Parame
         return None
     held = nominal.with_entries(*(
         replace(fit.parameters.entry(name), tolerance=0.0) for name in later))
-    again = fit_structure(observations, base.structure, held, one.metric,
+    again = fit_structure(observations, structure, held, one.metric,
                           fit.solution.values, {**fit.parameters}, 3)
     return None if again is None else (again, held)
 
