@@ -174,7 +174,8 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
             quick[k] = fit
     near = sorted(quick.items(), key=lambda pair: pair[1].solution.cost)[:finished]
     polished = workers.map(run_refit, [
-        Refit(observations, base, nominal, lean[k], common, 6, fit) for k, fit in near])
+        Refit(observations, base, nominal, lean[k], common, 16 if only_late else 6, fit)
+        for k, fit in near])
     fits = [(serious[k], fit) for (k, _), fit in zip(near, polished, strict=True)]
     usable = [(score, fit) for score, fit in fits if fit is not None and not is_eased(fit)]
     rebased = fit_structure(observations, base.structure, nominal, common,
