@@ -26,6 +26,9 @@ import numpy as np
 CERTAIN = 45.0
 #: The same for a change between recordings, where much else differs a little [nats].
 CERTAIN_CHANGE = 250.0
+#: The same before anything is refitted: signatures of the catalogue explain it then, and none of
+#: their refits does [nats].
+SCREENED_CHANGE = 500.0
 #: Way per wheel angle [m/rad] below which the ground does not push the robot: a twentieth of
 #: the smallest wheel.
 NO_GRIP = 0.015
@@ -157,8 +160,9 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     screened = first.scores[0].gain if first.scores else 0.0
     tried = max((r.held_out for r in first.rivals), default=0.0)
     if search.change is not None:
-        return tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]
-    return screened > CERTAIN or tried > CERTAIN or (
+        return screened > SCREENED_CHANGE or (
+            tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1])
+    return tried > CERTAIN or (
         unnamed is not None and unnamed.held_out > CERTAIN and unnamed.share > 0.0)
 
 

@@ -51,8 +51,10 @@ UNSTABLE = (0.35, 0.45)
 PLACEBO = 2.0
 #: Least share of the unexplained energy that a change between recordings must explain: with a
 #: gain above the first and the second number of nats that follow, and after another change.
-CHANGE_SHARE = (0.15, 0.06, 0.5)
-CHANGE_GAIN = (100.0, 250.0)
+CHANGE_SHARE = (0.035, 0.025, 0.5)
+CHANGE_GAIN = (80.0, 250.0)
+#: Share by which an effect that scales all that the ground does must be better than others.
+SWEEPING = 0.15
 #: What a late effect must gain more than the same one without an onset: nats and share.
 LATER = (12.0, 0.15)
 
@@ -316,10 +318,13 @@ def beyond_placebo(scores: Sequence[Score]) -> list[Score]:
 
 
 def _rank(rival: Rival) -> float:
-    # Held-out gain, less what an onset must bring.
+    # Held-out gain, less what an onset must bring, and what scales all that the ground does.
+    effect = rival.effect
+    much = SWEEPING * abs(rival.held_out) if (
+        effect.id == 'terrain_change' and effect.shape == 'damping') else 0.0
     if rival.onset is None:
-        return rival.held_out
-    return rival.held_out - LATER[0] - LATER[1] * abs(rival.held_out)
+        return rival.held_out - much
+    return rival.held_out - much - LATER[0] - LATER[1] * abs(rival.held_out)
 
 
 def _adopts(best: Rival, share: float, unstable: float, rest: float, number: int,
