@@ -26,7 +26,7 @@ from lg_husky_sim.identification.pieces import SETTLE
 from lg_husky_sim.identification.problem import Observations
 
 #: Most effects that the robot is given before the change is looked for.
-BEFORE = 4
+BEFORE = 3
 
 
 def search_change(whole: Observations, baseline: Collection[str], nominal: ModelFile,

@@ -42,6 +42,8 @@ TYRES = Effect('traction_saturation', shape='circle')
 TYRE_STARTS, TYRE_STEPS, GRIP_SHOWS = (6.0, 20.0), 6, 0.99
 #: The same is kept if it leaves less than this part of what the plain robot leaves.
 CLEARLY = 0.5
+#: Nothing more is tried where the first fits leave more than this part of it.
+HARDLY = 0.9
 
 
 def closed_base(observations: Observations, structure: Structure, nominal: Parameters,
@@ -86,6 +88,8 @@ def closed_base(observations: Observations, structure: Structure, nominal: Param
         return None
     metric = first_metric(observations, usable[0].solution.predicted)
     best = min(usable, key=lambda fit: energy(observations, fit, metric))
+    if energy(observations, best, metric) > HARDLY * energy(observations, plain, metric):
+        return None
     tasks = []
     for start in STARTS:
         # Where the fit without a limit is good, none is found from there: put one in.

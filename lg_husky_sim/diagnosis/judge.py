@@ -22,8 +22,12 @@ from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.problem import Observations
 import numpy as np
 
-#: Gain from which something is missing, whatever it is [nats].
-CERTAIN = 45.0
+#: Gain of a signature from which something is missing, if a refit then predicts held-out data so
+#: much better [nats].
+CERTAIN, FOLLOWED = 45.0, 25.0
+#: Held-out gain of anything from which something is missing [nats], and the share of the
+#: unexplained that a smooth description must explain then.
+PLAIN, SMOOTH_SHARE = 85.0, 0.05
 #: The same for a change between recordings, where much else differs a little [nats].
 CERTAIN_CHANGE = 250.0
 #: The same before anything is refitted: signatures of the catalogue explain it then, and none of
@@ -162,8 +166,8 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     if search.change is not None:
         return screened > SCREENED_CHANGE or (
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1])
-    return tried > CERTAIN or (
-        unnamed is not None and unnamed.held_out > CERTAIN and unnamed.share > 0.0)
+    return tried > PLAIN or (screened > CERTAIN and tried > FOLLOWED) or (
+        unnamed is not None and unnamed.held_out > PLAIN and unnamed.share > SMOOTH_SHARE)
 
 
 def rolls_without_moving(observations: Observations) -> bool:

@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lg_husky_sim.diagnosis.fits import extras_of, Fit
+from lg_husky_sim.diagnosis.fits import extras_of, Fit, fit_structure
 from lg_husky_sim.diagnosis.onsets import ONSET_STEP, place_onsets, time_onsets
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
 import numpy as np
@@ -18,6 +19,9 @@ import numpy as np
 #: Fine steps around the best coarse onset [s, m], and how far they go in coarse steps.
 FINE = {OnsetKind.TIME: 0.1, OnsetKind.PLACE_ABOVE: 0.05, OnsetKind.PLACE_BELOW: 0.05}
 REACH = 1.2
+#: Drop of the cost without the effect before an onset, its numbers unchanged, and after a refit,
+#: from which it begins there [nats].
+ABSENT, LATE = 5.0, 10.0
 #: Onsets within this many nats of the best are as good; their middle is taken.
 FLAT = 1.0
 
@@ -89,3 +93,46 @@ def refined_onset(observations: Observations, fit: Fit, metric: Metric,
             for k in range(-count, count + 1)]
     fine = [o for o in fine if o.value >= 0.0 or onset.kind is not OnsetKind.TIME]
     return _middle(fine, [_cost(observations, fit, metric, o) for o in fine])
+
+
+def begun_late(observations: Observations, fit: Fit, nominal: Parameters, metric: Metric) -> Fit:
+    """
+    Let the newest effect begin late, if it is absent before.
+
+    Signatures judge an onset along a straight line; here the effect, as it was fitted, is taken
+    away before each onset, which helps only where it was not there.
+
+    Parameters
+    ----------
+    observations : Observations
+    fit : Fit
+        Without an onset.
+    nominal : Parameters
+    metric : Metric
+
+    Returns
+    -------
+    Fit
+        The same where the effect is always there.
+    """
+    structure = fit.structure
+    effect = structure.effects[-1]
+    onsets = [onset for family in (time_onsets(observations), place_onsets(observations))
+              for onset, _ in family.onsets]
+    if structure.onset is not None or not onsets:
+        return fit
+    late = replace(structure, effects=(*structure.effects[:-1], replace(effect, late=True)),
+                   onset=onsets[0])
+    costs = [_cost(observations, replace(fit, structure=late), metric, o) for o in onsets]
+    best = int(np.argmin(costs))
+    white = metric.whiten(observations, observations.measured - fit.solution.predicted)
+    before = 0.5 * float(white @ white)
+    if before - costs[best] < ABSENT:
+        return fit
+    sizes = {**fit.parameters, **fit.solution.values}
+    again = fit_structure(observations, replace(late, onset=onsets[best]), nominal, metric,
+                          fit.solution.values, sizes, 4)
+    if again is None:
+        return fit
+    white = metric.whiten(observations, observations.measured - again.solution.predicted)
+    return again if before - 0.5 * float(white @ white) > LATE else fit

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from lg_husky_sim.diagnosis.candidates import candidates, changed_candidates
 from lg_husky_sim.diagnosis.evidence import folds_of
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate
-from lg_husky_sim.diagnosis.onset_placing import refined_onset
+from lg_husky_sim.diagnosis.onset_placing import begun_late, refined_onset
 from lg_husky_sim.diagnosis.onsets import change_onsets, Onsets, place_onsets, time_onsets
 from lg_husky_sim.diagnosis.rounds import LEAST_GAIN, play_round, Round
 from lg_husky_sim.diagnosis.workers import HERE, Workers
@@ -113,7 +113,7 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
     pool = candidates()
     if change is not None:
         pool = (*pool, *changed_candidates(structure, plain.parameters))
-    for number in range(most + 1):
+    for number in range(most if eager else most + 1):
         if change is not None:
             masks = change_onsets(observations, change, base.structure.onset)
         progress(f'round {number + 1}: signatures and refits', number / (most + 1))
@@ -133,8 +133,13 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         rounds.append(one)
         if not one.adopted:
             break
-        base = with_better_onset(observations, one.rivals[0].fit, nominal, one.metric,
-                                 change)
+        found = one.rivals[0].fit
+        if masks and change is None and number == 0:
+            found = begun_late(observations, found, nominal, one.metric)
+            one = replace(one, rivals=(replace(one.rivals[0], fit=found, effect=(
+                found.structure.effects[-1]), onset=found.structure.onset), *one.rivals[1:]))
+            rounds[-1] = one
+        base = with_better_onset(observations, found, nominal, one.metric, change)
         base = without_idle(observations, base, nominal, one.metric, structure)
         kept = set(base.structure.effects)
         rounds = [r for r in rounds if not r.adopted or _same(r, kept)]
