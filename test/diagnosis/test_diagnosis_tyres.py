@@ -11,7 +11,7 @@ from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.closed_base import TYRES, with_adhesion
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
-from lg_husky_sim.diagnosis.rounds import is_eased, Rival, _rank
+from lg_husky_sim.diagnosis.rounds import _rank, is_eased, Rival
 from lg_husky_sim.diagnosis.search import search
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model

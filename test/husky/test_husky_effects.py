@@ -180,7 +180,7 @@ def test_more_grip_undoes_a_limit(robot: Maker) -> None:
     changed = driven(robot(CIRCLE, more, traction_torque=1.0, grip_change=1.0), *WANDER)
     twice = driven(robot(CIRCLE, traction_torque=2.0), *WANDER)
     np.testing.assert_allclose(changed.values, twice.values, rtol=0, atol=1e-9)
-    with pytest.raises(ParameterError, match='grip .* needs traction_saturation'):
+    with pytest.raises(ParameterError, match=r'grip .* needs traction_saturation'):
         robot(more)
 
 
