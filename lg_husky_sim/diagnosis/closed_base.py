@@ -4,30 +4,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.evidence import energy
 from lg_husky_sim.diagnosis.fits import first_metric, Fit, fit_structure, recalibrate
 from lg_husky_sim.diagnosis.workers import HERE, Workers
+from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.resources import config_path
+from lg_husky_sim.yaml_files import read_yaml, shown
 
 #: What a base that closes a speed loop has: all of it is tried at once, since each alone is found
 #: in the guise of another.
 BASE = (Effect('command_latency'), Effect('command_slew', shape='both'), Effect('speed_loop'))
-#: Values of the same to begin from: a quick base and a slow one.
-STARTS: tuple[Mapping[str, float], ...] = (
-    {'latency': 0.05, 'slew_forward': 2.5, 'slew_yaw': 5.0, 'loop_lag': 0.1, 'loop_gain': 0.5,
-     'loop_integral': 20.0},
-    {'latency': 0.12, 'slew_forward': 1.0, 'slew_yaw': 2.0, 'loop_lag': 0.25, 'loop_gain': 0.5,
-     'loop_integral': 20.0},
-    {'latency': 0.12, 'slew_forward': 8.0, 'slew_yaw': 16.0, 'loop_lag': 0.25, 'loop_gain': 1.0,
-     'loop_integral': 4.0})
 #: A loop hides the dampings, so that their nominal values say little: factor on them to begin.
 DAMPED = 5.0
 #: Energy that numbers from all recordings may leave more in the earlier ones.
@@ -36,14 +32,59 @@ AS_GOOD = 1.01
 AGAIN, STEPS = 2, 8
 #: Steps by which a start is judged.
 QUICK = 3
-#: Tyres that share their grip between driving and scrubbing, limits to begin from [N·m], steps of
-#: their fit, and the part of the energy that they may leave to be kept.
+#: Tyres that share their grip between driving and scrubbing, steps of their fit, and the part of
+#: the energy that they may leave to be kept.
 TYRES = Effect('traction_saturation', shape='circle')
-TYRE_STARTS, TYRE_STEPS, GRIP_SHOWS = (6.0, 20.0), 6, 0.99
+TYRE_STEPS, GRIP_SHOWS = 6, 0.99
 #: The same is kept if it leaves less than this part of what the plain robot leaves.
 CLEARLY = 0.5
 #: Nothing more is tried where the first fits leave more than this part of it.
 HARDLY = 0.9
+
+
+@cache
+def starts() -> tuple[tuple[Mapping[str, float], ...], tuple[float, ...]]:
+    """
+    Read ``config/closed_base.yaml``.
+
+    Returns
+    -------
+    tuple of mapping
+        Numbers of a loop to begin from, one mapping for each kind of base.
+    tuple of float
+        Limits of a wheel's force to begin from [N·m].
+
+    Raises
+    ------
+    DiagnosisError
+        If a number is missing, unknown or outside its bounds.
+    """
+    path = config_path('closed_base.yaml')
+    content = read_yaml(path, DiagnosisError)
+
+    def checked(where: str, entries: Mapping[str, object], effects: Sequence[Effect]
+                ) -> dict[str, float]:
+        known = {p.name: p for effect in effects for p in effect.parameters()}
+        if set(entries) != set(known):
+            raise DiagnosisError(f'{path}: {where} has {", ".join(sorted(entries))}; it needs '
+                                 f'{", ".join(sorted(known))}')
+        for name, value in entries.items():
+            low, high = known[name].lower, known[name].upper
+            if not isinstance(value, (int, float)) or not low <= value <= high:
+                raise DiagnosisError(f'{path}: {where}.{name} = {shown(value)} is not a number '
+                                     f'between {low:g} and {high:g}')
+        return {name: float(str(value)) for name, value in entries.items()}
+
+    try:
+        bases = tuple(checked(f'bases.{kind}', {k: v for k, v in entries.items()
+                                                if k != 'source'}, BASE)
+                      for kind, entries in content['bases'].items())
+        name, = (p.name for p in TYRES.parameters())
+        tyres = tuple(checked('tyres', {name: value}, (TYRES,))[name]
+                      for value in content['tyres']['values'])
+    except (KeyError, TypeError, AttributeError) as error:
+        raise DiagnosisError(f'{path} cannot be understood: {error}') from error
+    return bases, tyres
 
 
 def closed_base(observations: Observations, structure: Structure, nominal: Parameters,
@@ -66,13 +107,14 @@ def closed_base(observations: Observations, structure: Structure, nominal: Param
     Fit or None
         None where that is no clear improvement.
     """
+    bases, _ = starts()
     plain = recalibrate(observations, structure, nominal)
     lacking = [e for e in BASE if all(e.id != there.id for there in structure.effects)]
     whole = structure
     for effect in lacking:
         whole = whole.with_effect(effect)
     tasks = []
-    for start in STARTS if known is None else ():
+    for start in bases if known is None else ():
         given = nominal.with_entries(*(
             p for effect in lacking for p in effect_entries(effect, start)))
         sizes = {name: given[name] for name in given}
@@ -91,7 +133,7 @@ def closed_base(observations: Observations, structure: Structure, nominal: Param
     if energy(observations, best, metric) > HARDLY * energy(observations, plain, metric):
         return None
     tasks = []
-    for start in STARTS:
+    for start in bases:
         # Where the fit without a limit is good, none is found from there: put one in.
         limited = {name: start[name] for name in ('slew_forward', 'slew_yaw')}
         given = nominal.with_entries(*(
@@ -170,7 +212,7 @@ def with_adhesion(observations: Observations, fit: Fit, nominal: Parameters,
     tasks = [Begun(observations, structure, nominal.with_entries(
         *(fit.parameters.entry(p.name) for e in fit.structure.effects for p in e.parameters()),
         *effect_entries(TYRES, {name: start})), {**known, name: start}, fit, TYRE_STEPS, 1)
-        for start in TYRE_STARTS]
+        for start in starts()[1]]
     metric = first_metric(observations, fit.solution.predicted)
     tried = [one for one in workers.map(fitted, tasks) if one is not None]
     best = min(tried, key=lambda one: energy(observations, one, metric), default=fit)

@@ -6,19 +6,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 from lg_husky_sim.comparison.output import simulate_commands
+from lg_husky_sim.diagnosis import closed_base
 from lg_husky_sim.diagnosis.candidates import effect_entries
-from lg_husky_sim.diagnosis.closed_base import TYRES, with_adhesion
+from lg_husky_sim.diagnosis.closed_base import starts, TYRES, with_adhesion
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
 from lg_husky_sim.diagnosis.rounds import _rank, is_eased, Rival
 from lg_husky_sim.diagnosis.search import search
+from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Recording, segments
+from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
@@ -109,3 +113,23 @@ def test_better_ground_is_no_limit_and_sweeping_changes_must_be_better() -> None
         ('terrain_change', 110.0), ('yaw_scrub_coulomb', 100.0)))
     assert _rank(ground) < _rank(other)
     assert _rank(replace(ground, held_out=120.0)) > _rank(other)
+
+
+@pytest.mark.parametrize(('there', 'instead', 'named'), [
+    ('loop_gain: 1.0', 'loop_gain: -1.0', r'bases\.unlimited\.loop_gain = -1\.0 .* between 0 and'),
+    ('loop_gain: 1.0', 'loop_gain: fast', "bases.unlimited.loop_gain = 'fast' is not a number"),
+    ('latency: 0.05 ', 'lateness: 0.05 ', 'bases.quick has .*lateness.*it needs .*latency'),
+    ('tyres:', 'wheels:', 'cannot be understood')])
+def test_wrong_starts_are_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                          there: str, instead: str, named: str) -> None:
+    text = config_path('closed_base.yaml').read_text(encoding='utf-8')
+    assert there in text
+    changed = tmp_path / 'closed_base.yaml'
+    changed.write_text(text.replace(there, instead), encoding='utf-8')
+    monkeypatch.setattr(closed_base, 'config_path', lambda name: changed)
+    starts.cache_clear()
+    try:
+        with pytest.raises(DiagnosisError, match=named):
+            starts()
+    finally:
+        starts.cache_clear()
