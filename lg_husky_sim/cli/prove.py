@@ -12,6 +12,7 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from lg_husky_sim.proof.scoring import Judgement
     from lg_husky_sim.proof.trial import Folders
 
 
@@ -36,11 +37,13 @@ if TYPE_CHECKING:
 @click.option('--generate-only', is_flag=True, help='Make and seal the cases; diagnose nothing.')
 @click.option('--score-only', is_flag=True,
               help='Score the cases that are diagnosed already; diagnose nothing.')
+@click.option('--pool', 'pooled', multiple=True, type=click.Path(path_type=Path), metavar='DIR',
+              help='Count the cases of another trial, scored before, with this one.')
 @click.option('--page', type=click.Path(path_type=Path), metavar='FILE.md',
               help='Also write the results as a page, with pictures beside it.')
 def command(
     cases: int, seed: int | None, tuning: bool, world: str, drive: str, jobs: int, out: Path,
-    generate_only: bool, score_only: bool, page: Path | None,
+    generate_only: bool, score_only: bool, pooled: tuple[Path, ...], page: Path | None,
 ) -> None:
     """
     Try the diagnosis blind on robots with hidden physics.
@@ -56,6 +59,7 @@ def command(
     first = seed if seed is not None else (1 if tuning else plan.FIRST_REPORT_SEED)
     plan.check_seeds(first, cases, report=not tuning)
     specs = plan.plan(cases, first, world, drive)
+    others = [trial.scored(root) for root in pooled]
     folders = trial.Folders(out)
     trial.keep_plan(folders, specs)
     names = [trial.name_of(k) for k in range(cases)]
@@ -75,7 +79,10 @@ def command(
               f'--{"tuning" if tuning else "report"} --world {world} --set {drive} --out DIR')
     facts = {'command': called, 'planned': cases, 'seal': seal, 'first_seed': first,
              'last_seed': first + cases - 1}
-    _report(folders, sealed, names, facts, page)
+    judged = trial.open_and_judge(folders, sealed, names)
+    if others:
+        facts['trials'] = [*(other for _, other in others), {**facts, 'cases': len(judged)}]
+    _report(folders, (*(one for before, _ in others for one in before), *judged), facts, page)
 
 
 def _seal_of(sealed: dict[str, str], names: Sequence[str]) -> str:
@@ -84,9 +91,9 @@ def _seal_of(sealed: dict[str, str], names: Sequence[str]) -> str:
     return commitment({name: sealed[name] for name in names})
 
 
-def _report(folders: Folders, sealed: dict[str, str], names: Sequence[str],
-            facts: dict[str, Any], page: Path | None) -> None:
-    """Open the answers, judge, print, and write the results and the page."""
+def _report(folders: Folders, judged: Sequence[Judgement], facts: dict[str, Any],
+            page: Path | None) -> None:
+    """Print what was judged, and write the results and the page."""
     from dataclasses import asdict
     from importlib.util import find_spec
 
@@ -95,9 +102,7 @@ def _report(folders: Folders, sealed: dict[str, str], names: Sequence[str],
     from lg_husky_sim.proof.pictures import draw
     from lg_husky_sim.proof.sealing import write_json
     from lg_husky_sim.proof.summary import summarise
-    from lg_husky_sim.proof.trial import open_and_judge
 
-    judged = open_and_judge(folders, sealed, names)
     results = {**summarise(judged), **facts}
     write_json(folders.root / 'results.json', plain({
         **results, 'judgements': [asdict(one) for one in judged]}))

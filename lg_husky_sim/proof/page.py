@@ -12,8 +12,8 @@ from typing import Any
 Json = Mapping[str, Any]
 
 _ABOUT = """\
-This page is written by the command below from the results of a blind trial; nobody edits
-its figures.
+This page is written by {these} below from the results of a blind trial; nobody edits its
+figures.
 
     {command}
 
@@ -21,7 +21,7 @@ A generator that shares no code with the diagnosis hides physics in a robot, dri
 and publishes rosbags. The answers are sealed: the SHA-256 of each salted answer is written down
 before the first diagnosis (all of them together: `{seal}`). Then
 `lg_husky diagnose --no-report` is called as any user would call it, with the recordings and
-nothing else. Robots used for tuning have seeds below 10000, those reported here {first} to {last}.
+nothing else. Robots used for tuning have seeds below 10000, those reported here {seeds}.
 
 | world | what stands in for the real robot |
 | --- | --- |
@@ -98,11 +98,25 @@ def _rate_rows(rates: Sequence[Json]) -> list[list[str]]:
              _target(rate), _mark(rate)] for rate in rates if rate['count']]
 
 
+def _trials(results: Json) -> Sequence[Json]:
+    return results.get('trials') or [results]
+
+
+def _about(results: Json) -> str:
+    trials = _trials(results)
+    return _ABOUT.format(
+        these='the command' if len(trials) == 1 else 'the commands',
+        command='\n    '.join(one['command'] for one in trials),
+        seal='` and `'.join(one['seal'][:16] for one in trials),
+        seeds=' and '.join(f'{one["first_seed"]} to {one["last_seed"]}' for one in trials)).strip()
+
+
 def _unfinished(results: Json) -> list[str]:
-    if results['cases'] == results['planned']:
+    trials = _trials(results)
+    if all(one['cases'] == one['planned'] for one in trials):
         return []
-    return [f'The first {results["cases"]} of {results["planned"]} cases to finish; '
-            'their order is random.', '']
+    said = ' and '.join(f'the first {one["cases"]} of {one["planned"]}' for one in trials)
+    return [f'{said[0].upper()}{said[1:]} cases to finish; their order is random.', '']
 
 
 def page_of(results: Json, pictures: str = 'pictures') -> str:
@@ -113,15 +127,14 @@ def page_of(results: Json, pictures: str = 'pictures') -> str:
     ----------
     results
         The results file: `summary.summarise` with 'command', 'planned', 'seal',
-        'first_seed', 'last_seed' beside.
+        'first_seed', 'last_seed' beside; or, of several trials, with a list of these and
+        of their 'cases' in 'trials'.
     pictures
         Folder of the pictures, as the page links to them.
 
     """
     head = ('question', 'cases', 'rate (95 % interval)', 'target', '')
-    parts = ['# Proof: a blind trial', '', _ABOUT.format(
-        command=results['command'], seal=results['seal'][:16],
-        first=results['first_seed'], last=results['last_seed']).strip(), '',
+    parts = ['# Proof: a blind trial', '', _about(results), '',
         *_unfinished(results), '## Figures', '', _markdown(head, _rate_rows(results['rates'])), '',
         f'![rates with intervals]({pictures}/proof_rates.png)', '',
         '## Held-out improvement', '',

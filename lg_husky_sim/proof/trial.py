@@ -275,3 +275,32 @@ def open_and_judge(folders: Folders, sealed: dict[str, str],
         answer = unseal(folders.answers / f'{name}.json', sealed[name])
         result.append(judge(answer, json.loads(path.read_text())))
     return tuple(result)
+
+
+def scored(root: Path) -> tuple[tuple[Judgement, ...], dict[str, Any]]:
+    """
+    Judge a trial again that was scored before, to be put together with others.
+
+    Returns
+    -------
+    tuple of Judgement
+        Of all its diagnosed cases.
+    dict
+        'command', 'planned', 'seal', 'first_seed' and 'last_seed' of its results, and 'cases'.
+
+    Raises
+    ------
+    LgHuskyError
+        The folder holds no scored trial.
+
+    """
+    folders, path = Folders(root), root / 'results.json'
+    try:
+        results = json.loads(path.read_text())
+        sealed = json.loads(folders.commitments.read_text())
+        facts = {name: results[name] for name in (
+            'command', 'planned', 'seal', 'first_seed', 'last_seed')}
+    except (OSError, ValueError, KeyError) as error:
+        raise LgHuskyError(f'{root} holds no scored trial: {error}') from error
+    judged = open_and_judge(folders, sealed, diagnosed(folders, list(sealed)))
+    return judged, {**facts, 'cases': len(judged)}

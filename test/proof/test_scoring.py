@@ -204,6 +204,15 @@ def test_text_and_page_say_the_figures() -> None:
     assert '| slope | 3 | 2 | 3 | 0.80 | payload 1 |' in page
     assert 'cases to finish' not in page
     assert 'The first 6 of 9 cases to finish' in page_of({**result, 'planned': 9})
+    one = {'command': 'lg_husky prove --seed 10000', 'planned': 4, 'cases': 4, 'seal': 'ab' * 32,
+           'first_seed': 10_000, 'last_seed': 10_003}
+    page = page_of({**result, 'trials': [one, {
+        **one, 'command': 'lg_husky prove --seed 11000', 'planned': 9, 'cases': 2,
+        'seal': 'cd' * 32, 'first_seed': 11_000, 'last_seed': 11_008}]})
+    assert '    lg_husky prove --seed 10000\n    lg_husky prove --seed 11000\n' in page
+    assert f'`{"ab" * 8}` and `{"cd" * 8}`' in page
+    assert 'reported here 10000 to 10003 and 11000 to 11008.' in page
+    assert 'The first 4 of 4 and the first 2 of 9 cases to finish' in page
 
 
 def test_pictures_are_drawn(tmp_path: Any) -> None:

@@ -70,6 +70,20 @@ def test_a_trial_is_sealed_blind_resumed_and_scored(
     assert len(asked) == before, 'a resumed trial asks nothing again'
 
 
+def test_trials_are_counted_together(prepared: trial.Folders,
+                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    play(monkeypatch, prepared)
+    list(trial.diagnose_all(prepared, ['case_0001', 'case_0002'], 1))
+    with pytest.raises(LgHuskyError, match='holds no scored trial'):
+        trial.scored(prepared.root)
+    facts = {'command': 'lg_husky prove', 'planned': 2, 'seal': 'ab', 'first_seed': 3,
+             'last_seed': 4}
+    (prepared.root / 'results.json').write_text(json.dumps({**facts, 'judgements': []}))
+    judged, kept = trial.scored(prepared.root)
+    assert [one.kind for one in judged] == ['clean', 'single']
+    assert kept == {**facts, 'cases': 2}
+
+
 def test_preparing_again_makes_nothing_new(prepared: trial.Folders) -> None:
     path = prepared.cases / 'case_0001/recordings/rec1/metadata.yaml'
     before = path.stat().st_mtime_ns
