@@ -134,7 +134,8 @@ def page_of(results: Json, pictures: str = 'pictures') -> str:
 
     """
     head = ('question', 'cases', 'rate (95 % interval)', 'target', '')
-    parts = ['# Proof: a blind trial', '', _about(results), '',
+    parts = [
+        '# Proof: a blind trial', '', _about(results), '',
         *_unfinished(results), '## Figures', '', _markdown(head, _rate_rows(results['rates'])), '',
         f'![rates with intervals]({pictures}/proof_rates.png)', '',
         '## Held-out improvement', '',
