@@ -77,8 +77,14 @@ def _is_given(search: Search) -> bool:
 
 
 def _rivals(one: Round, named: Effect | None) -> tuple[Rivalry, ...]:
-    return tuple(Rivalry(r.effect.id, r.effect.side, r.held_out)
-                 for r in one.rivals if named is None or r.effect.id != named.id)
+    # Each effect once, by the best of its sides and shapes.
+    best: dict[str, Rivalry] = {}
+    for r in one.rivals:
+        known = best.get(r.effect.id)
+        if (named is None or r.effect.id != named.id) and (
+                known is None or r.held_out > known.held_out_gain):
+            best[r.effect.id] = Rivalry(r.effect.id, r.effect.side, r.held_out)
+    return tuple(best.values())
 
 
 def findings(search: Search) -> tuple[Finding, ...]:
@@ -246,7 +252,7 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
         The description to put into the model, where it predicts held-out data better.
     """
     first = search.rounds[0]
-    rivals = tuple(Rivalry(r.effect.id, r.effect.side, r.held_out) for r in first.rivals)
+    rivals = _rivals(first, None)
     near = max(first.rivals, key=lambda r: r.held_out, default=None)
     best = unnamed.descriptions[0] if unnamed.descriptions else None
     described = best is not None and best.held_out > CERTAIN and unnamed.share > 0.0

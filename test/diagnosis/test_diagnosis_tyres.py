@@ -19,6 +19,7 @@ from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Recording, segments
@@ -96,7 +97,7 @@ def test_what_the_earlier_recordings_could_not_show_is_no_change(part: float, na
     assert there == (['voltage_saturation'] if slow else [])
 
 
-def test_better_ground_is_no_limit_and_sweeping_changes_must_be_better() -> None:
+def test_ground_limits_and_rivals_are_what_they_are_called() -> None:
     model = load_model()
     again = replace(TYRES, late=True, again=True)
     structure = model.structure.with_effect(TYRES).with_effect(
@@ -109,6 +110,13 @@ def test_better_ground_is_no_limit_and_sweeping_changes_must_be_better() -> None
             *effect_entries(again, {'traction_torque_later': later}))
         fit = Fit(structure, parameters, solution)
         assert is_eased(fit) is eased
+    metric = Metric(np.ones(1), {})
+    sides = [Rival(Effect('viscous_asymmetry', side), None, fit, 100.0, gain)
+             for side, gain in (('left', 30.0), ('right', 70.0))]
+    listed = _rivals(Round(fit, (), (*sides, Rival(Effect('payload'), None, fit, 100.0, 50.0)),
+                           metric, 0.5, True), Effect('payload'))
+    assert [(one.effect, one.side, one.held_out_gain) for one in listed] == [
+        ('viscous_asymmetry', 'right', 70.0)]
     ground, other = (Rival(Effect(name), None, fit, 100.0, gain) for name, gain in (
         ('terrain_change', 110.0), ('yaw_scrub_coulomb', 100.0)))
     assert _rank(ground) < _rank(other)
