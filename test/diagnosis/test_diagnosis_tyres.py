@@ -13,7 +13,8 @@ from lg_husky_sim.diagnosis import closed_base
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.closed_base import starts, TYRES, with_adhesion
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
-from lg_husky_sim.diagnosis.rounds import _rank, is_eased, Rival
+from lg_husky_sim.diagnosis.judge import _rivals
+from lg_husky_sim.diagnosis.rounds import _rank, is_eased, Rival, Round
 from lg_husky_sim.diagnosis.search import search
 from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
