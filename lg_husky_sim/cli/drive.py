@@ -43,6 +43,9 @@ def command(manoeuvre: str, preset: str, topic: str | None, kind: str | None, wa
                   mininterval=0.1 if sys.stderr.isatty() else 5.0) as bar:
             sent = drive(script, settings, wait=wait,
                          progress=lambda moment: bar.update(moment - bar.n))
+    except api.ExternalShutdownException:
+        # ROS 2 turns a signal into the end of the graph.
+        raise click.Abort from None
     finally:
         api.try_shutdown()
     click.echo(f'{sent} commands sent to {settings.command_topic}')

@@ -42,6 +42,9 @@ def command(recording: Path, preset: str, topics: tuple[str, ...], speed: float,
                   bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s') as bar:
             sent = play(read.streams, settings, wait=wait, speed=speed,
                         progress=lambda moment: bar.update(moment - bar.n))
+    except api.ExternalShutdownException:
+        # ROS 2 turns a signal into the end of the graph.
+        raise click.Abort from None
     finally:
         api.try_shutdown()
     click.echo(f'{sent} messages sent')

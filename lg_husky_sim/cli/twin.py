@@ -53,7 +53,7 @@ def command(model: Path, plain: Path | None, preset: str, seconds: float | None,
         while seconds is None or time.monotonic() - begun < seconds:
             twin.spin(every)
             click.echo(f'{time.monotonic() - begun:7.1f} s  {_errors(twin, "now")}')
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, api.ExternalShutdownException):
         click.echo('')
     finally:
         click.echo(f'  overall  {_errors(twin, "overall")}')

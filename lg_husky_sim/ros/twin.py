@@ -89,6 +89,8 @@ class Shadow:
         if onset is not None and onset.kind.value == 'time':
             self.plant = Plant((self.plant.sets[-1],), self.plant.states)
         self._simulator = Simulator(self.plant, PERIOD)
+        # Compiling takes seconds; better now than while the robot drives.
+        self._simulator.step(self._simulator.initial(), BodyTwist(0.0, 0.0))
         self._state: SimulatorState | None = None
         self._command = BodyTwist(0.0, 0.0)
         self._since = -math.inf

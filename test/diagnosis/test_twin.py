@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+import signal
 import subprocess
 import sys
 from typing import Any
@@ -116,3 +117,28 @@ def test_live_error_drops_with_the_augmented_model(
             assert heard['plain'][-1].data > heard['model'][-1].data > 0.0
         finally:
             twin.close()
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('verb', ['play', 'drive'])
+def test_a_signal_ends_what_is_sent_with_one_line(
+        drive: Callable[..., Recording], tmp_path: Path, verb: str, number: signal.Signals
+        ) -> None:
+    write_recording(tmp_path / 'bag', drive('any', 'rotation', 4).streams,
+                    frames=('odom', 'base_link'))
+    what = str(tmp_path / 'bag') if verb == 'play' else 'circle'
+    with probed_domain() as probe:
+        heard = probe.listen('geometry_msgs/msg/Twist', make_settings().command_topic)
+        sender = subprocess.Popen(
+            [sys.executable, '-m', 'lg_husky_sim.cli.main', verb, what, '--wait', '30'],
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        try:
+            assert probe.until(lambda: heard or sender.poll() is not None, 30.0)
+            sender.send_signal(number)
+            _, said = sender.communicate(timeout=10.0)
+        finally:
+            sender.kill()
+            sender.wait()
+    assert sender.returncode == 130
+    assert said.replace('\r', '\n').splitlines()[-1] == 'interrupted'
+    assert 'Traceback' not in said
