@@ -52,6 +52,7 @@ def command(
     sealed before the first diagnosis and opened after the last. DIR gets the recordings, the
     answers, the diagnoses, results.json, results.md and pictures.
     """
+    from lg_husky_sim.errors import CommandError
     from lg_husky_sim.extras import require
     from lg_husky_sim.proof import plan, trial
 
@@ -59,7 +60,12 @@ def command(
     first = seed if seed is not None else (1 if tuning else plan.FIRST_REPORT_SEED)
     plan.check_seeds(first, cases, report=not tuning)
     specs = plan.plan(cases, first, world, drive)
+    together = [path.resolve() for path in (*pooled, out)]
+    if len(set(together)) < len(together):
+        raise CommandError('--pool names a folder twice, or that of --out; each trial counts once')
     others = [trial.scored(root) for root in pooled]
+    for _, other in others:
+        plan.check_seeds(other['first_seed'], other['planned'], report=not tuning)
     folders = trial.Folders(out)
     trial.keep_plan(folders, specs)
     names = [trial.name_of(k) for k in range(cases)]
@@ -76,7 +82,8 @@ def command(
             for _ in trial.diagnose_all(folders, names, jobs):
                 bar.update(1)
     called = (f'lg_husky prove --cases {cases} --seed {first} '
-              f'--{"tuning" if tuning else "report"} --world {world} --set {drive} --out DIR')
+              f'--{"tuning" if tuning else "report"} --world {world} --set {drive} --out DIR'
+              + ' --pool OTHER' * len(pooled))
     facts = {'command': called, 'planned': cases, 'seal': seal, 'first_seed': first,
              'last_seed': first + cases - 1}
     judged = trial.open_and_judge(folders, sealed, names)

@@ -27,7 +27,7 @@ import numpy as np
 CERTAIN, FOLLOWED = 45.0, 25.0
 #: Held-out gain of anything from which something is missing [nats], and the share of the
 #: unexplained that a smooth description must explain then.
-PLAIN, SMOOTH_SHARE = 85.0, 0.05
+EVIDENT, SMOOTH_SHARE = 85.0, 0.05
 #: The same for a change between recordings, where much else differs a little [nats].
 CERTAIN_CHANGE = 250.0
 #: The same before anything is refitted: signatures of the catalogue explain it then, and none of
@@ -172,8 +172,8 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     if search.change is not None:
         return screened > SCREENED_CHANGE or (
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1])
-    return tried > PLAIN or (screened > CERTAIN and tried > FOLLOWED) or (
-        unnamed is not None and unnamed.held_out > PLAIN and unnamed.share > SMOOTH_SHARE)
+    return tried > EVIDENT or (screened > CERTAIN and tried > FOLLOWED) or (
+        unnamed is not None and unnamed.held_out > EVIDENT and unnamed.share > SMOOTH_SHARE)
 
 
 def rolls_without_moving(observations: Observations) -> bool:

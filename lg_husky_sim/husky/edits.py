@@ -239,7 +239,7 @@ def _chassis(network: EditedNetwork, effect: Effect) -> EditedNetwork:
             heavier |= _ground(network, weight, weight)
             network = replace(network, grip=f'{network.grip}*{weight}')
         return network.with_values(heavier)
-    if effect.shape == 'grip':
+    if (effect.id, effect.shape) == ('terrain_change', 'grip'):
         return replace(network, grip=f'{network.grip}*(1+grip_change)')
     if effect.id == 'terrain_change':
         slip, scrub = '(1+wheel_damping_change)', '(1+yaw_damping_change)'

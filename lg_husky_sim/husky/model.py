@@ -86,7 +86,7 @@ class Structure:
         graph = network.simplified() if self.drivetrain is Drivetrain.SIMPLIFIED else (
             network.expanded())
         edited, there = EditedNetwork(graph), self.in_force(late)
-        if any(e.shape == 'grip' for e in there) and all(
+        if any((e.id, e.shape) == ('terrain_change', 'grip') for e in there) and all(
                 e.id != 'traction_saturation' for e in there):
             raise ParameterError('effect terrain_change of shape grip changes a limit of the '
                                  'tyres; it needs traction_saturation')

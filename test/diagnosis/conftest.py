@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 
 from lg_husky_sim.comparison.output import simulate_commands
@@ -13,6 +13,7 @@ from lg_husky_sim.diagnosis.diagnose import Case, diagnose
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import TimeSeries
@@ -45,10 +46,16 @@ def driven(name: str, hidden: str, seed: int, backwards: bool = False) -> Record
     if effect is not None:
         structure = structure.with_effect(effect)
         parameters = parameters.with_entries(*effect_entries(effect, sizes))
-    steps = tuple(Step(duration, forward, yaw, 0.2)
-                  for duration, forward, yaw in (STEPS[::-1] if backwards else STEPS))
-    streams = simulate_commands(compile_model(structure).at(parameters),
-                                Manoeuvre(name, steps).commands(), 1.0)
+    steps = STEPS[::-1] if backwards else STEPS
+    return recorded(name, compile_model(structure).at(parameters), steps, seed)
+
+
+def recorded(name: str, plant: Plant, steps: Sequence[tuple[float, float, float]], seed: int
+             ) -> Recording:
+    """Return what noisy sensors see of steps of (duration, forward, yaw)."""
+    script = Manoeuvre(name, tuple(Step(duration, forward, yaw, 0.2)
+                                   for duration, forward, yaw in steps))
+    streams = simulate_commands(plant, script.commands(), 1.0)
     rng = np.random.default_rng(seed)
     made = {'command': streams['command']}
     for stream, deviation in NOISE.items():
@@ -57,6 +64,12 @@ def driven(name: str, hidden: str, seed: int, backwards: bool = False) -> Record
             series.times, series.values + deviation * rng.standard_normal(series.values.shape),
             series.names)
     return Recording(name, name, made, 0, frames=('odom', 'base_link'))
+
+
+@pytest.fixture(scope='session')
+def record() -> Callable[..., Recording]:
+    """Return the function that records a plant."""
+    return recorded
 
 
 @pytest.fixture(scope='session')

@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis import closed_base
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.closed_base import starts, TYRES, with_adhesion
@@ -22,19 +21,17 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations, observations
-from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Recording, segments
 from lg_husky_sim.resources import config_path
-from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
 
 STEPS = ((1.0, 0.0, 0.0), (2.0, 0.9, 0.0), (2.0, 0.5, 0.6), (2.0, -0.6, -0.5), (2.0, 0.0, -0.9),
          (2.0, 0.7, -0.4), (2.0, 0.0, 0.0))
-NOISE = {'wheels': 0.02, 'imu': 0.005, 'pose': 0.003, 'wheel_angles': 0.0}
+Record = Callable[..., Recording]
 
 
-def driven(name: str, effects: Mapping[Effect, Mapping[str, float]], seed: int,
+def driven(record: Record, name: str, effects: Mapping[Effect, Mapping[str, float]], seed: int,
            scale: float = 1.0) -> Recording:
     """Return 13 s of an open-loop robot whose driver asks for a part of the full speed."""
     model = load_model()
@@ -42,26 +39,17 @@ def driven(name: str, effects: Mapping[Effect, Mapping[str, float]], seed: int,
     for effect, values in effects.items():
         structure = structure.with_effect(effect)
         parameters = parameters.with_entries(*effect_entries(effect, values))
-    steps = tuple(Step(duration, scale * forward, scale * yaw, 0.2)
-                  for duration, forward, yaw in STEPS)
-    made = simulate_commands(compile_model(structure).at(parameters),
-                             Manoeuvre(name, steps).commands(), 1.0)
-    rng = np.random.default_rng(seed)
-    streams = {'command': made['command']}
-    for stream, deviation in NOISE.items():
-        one = made[stream]
-        streams[stream] = TimeSeries(
-            one.times, one.values + deviation * rng.standard_normal(one.values.shape), one.names)
-    return Recording(name, name, streams, 0, frames=('odom', 'base_link'))
+    return record(name, compile_model(structure).at(parameters), [
+        (duration, scale * forward, scale * yaw) for duration, forward, yaw in STEPS], seed)
 
 
 def seen(*recordings: Recording) -> Observations:
     return observations([part for one in recordings for part in segments(one)])
 
 
-def test_limited_grip_is_given_to_a_base_that_has_it() -> None:
+def test_limited_grip_is_given_to_a_base_that_has_it(record: Record) -> None:
     model = load_model()
-    data = seen(driven('base1', {TYRES: {'traction_torque': 2.0}}, 1))
+    data = seen(driven(record, 'base1', {TYRES: {'traction_torque': 2.0}}, 1))
     plain = recalibrate(data, model.structure, model.parameters)
     fit = with_adhesion(data, plain, model.parameters)
     assert fit.structure.effects == (TYRES,)
@@ -69,16 +57,16 @@ def test_limited_grip_is_given_to_a_base_that_has_it() -> None:
     assert with_adhesion(data, fit, model.parameters) is fit
 
 
-def test_a_base_that_holds_the_ground_stays_as_it_is() -> None:
+def test_a_base_that_holds_the_ground_stays_as_it_is(record: Record) -> None:
     model = load_model()
-    data = seen(driven('base1', {}, 1))
+    data = seen(driven(record, 'base1', {}, 1))
     plain = recalibrate(data, model.structure, model.parameters)
     assert with_adhesion(data, plain, model.parameters) is plain
 
 
 @pytest.mark.parametrize(('part', 'named'), [(0.4, []), (1.0, ['voltage_saturation'])])
-def test_what_the_earlier_recordings_could_not_show_is_no_change(part: float, named: list[str]
-                                                                 ) -> None:
+def test_what_the_earlier_recordings_could_not_show_is_no_change(
+        record: Record, part: float, named: list[str]) -> None:
     """
     A driver of 16 V shows at full speed only.
 
@@ -87,7 +75,8 @@ def test_what_the_earlier_recordings_could_not_show_is_no_change(part: float, na
     """
     model, clipped = load_model(), {Effect('voltage_saturation'): {'clip_voltage': 16.0}}
     slow = part < 1.0
-    whole = seen(driven('base1', clipped if slow else {}, 1, part), driven('rec1', clipped, 2))
+    whole = seen(driven(record, 'base1', clipped if slow else {}, 1, part),
+                 driven(record, 'rec1', clipped, 2))
     exact = model.parameters.with_entries(*(
         replace(p, tolerance=0.0) for p in model.parameters.entries))
     start = next(p for p in whole.pieces if p.recording == 'rec1').start
@@ -98,12 +87,12 @@ def test_what_the_earlier_recordings_could_not_show_is_no_change(part: float, na
     assert there == (['voltage_saturation'] if slow else [])
 
 
-def test_ground_limits_and_rivals_are_what_they_are_called() -> None:
+def test_ground_limits_and_rivals_are_what_they_are_called(record: Record) -> None:
     model = load_model()
     again = replace(TYRES, late=True, again=True)
     structure = model.structure.with_effect(TYRES).with_effect(
         again, Onset(OnsetKind.TIME, 3.0, 'rec1'))
-    solution = recalibrate(seen(driven('base1', {}, 1)), model.structure,
+    solution = recalibrate(seen(driven(record, 'base1', {}, 1)), model.structure,
                            model.parameters).solution
     for later, eased in ((8.0, True), (2.0, False)):
         parameters = model.parameters.with_entries(

@@ -18,6 +18,7 @@ from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
 from lg_husky_sim.recording import Recording, write_recording
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.signals import BodyTwist
+from lg_husky_sim.simulation import Simulator, SimulatorState
 import pytest
 
 for needed in ('rosbags', 'cyclonedds'):
@@ -141,4 +142,40 @@ def test_a_signal_ends_what_is_sent_with_one_line(
             sender.wait()
     assert sender.returncode == 130
     assert said.replace('\r', '\n').splitlines()[-1] == 'interrupted'
+    assert 'Traceback' not in said
+
+
+def test_a_shadow_has_stepped_before_it_hears_anything(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiling takes seconds; a robot that drives meanwhile would be blamed on the model."""
+    stepped: list[float] = []
+    step = Simulator.step
+
+    def counted(self: Simulator, state: SimulatorState, command: BodyTwist) -> SimulatorState:
+        stepped.append(state.time)
+        return step(self, state, command)
+    monkeypatch.setattr(Simulator, 'step', counted)
+    model = load_model()
+    shadow = Shadow(compile_model(model.structure).at(model.parameters))
+    assert len(stepped) == 1
+    assert shadow._state is None
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_twin_with_its_errors(tmp_path: Path, number: signal.Signals) -> None:
+    save_model(load_model(), tmp_path / 'model.yaml')
+    with probed_domain():
+        twin = subprocess.Popen(
+            [sys.executable, '-u', '-m', 'lg_husky_sim.cli.main', 'twin', '--model',
+             str(tmp_path / 'model.yaml'), '--every', '0.2'],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert twin.stdout is not None
+        try:
+            assert 'nothing heard yet' in twin.stdout.readline()
+            twin.send_signal(number)
+            out, said = twin.communicate(timeout=10.0)
+        finally:
+            twin.kill()
+            twin.wait()
+    assert twin.returncode == 0
+    assert 'overall' in out.splitlines()[-1]
     assert 'Traceback' not in said

@@ -126,3 +126,12 @@ def test_seeds_of_the_other_kind_are_refused(tmp_path: Path, arguments: list[str
     assert isinstance(result.exception, CommandError)
     assert message in str(result.exception)
     assert not (tmp_path / 'out').exists()
+
+
+def test_each_trial_counts_once(tmp_path: Path) -> None:
+    for pooled in (['--pool', str(tmp_path / 'out')],
+                   ['--pool', str(tmp_path / 'one'), '--pool', str(tmp_path / 'one')]):
+        result = CliRunner().invoke(command, [*pooled, '--out', str(tmp_path / 'out')])
+        assert isinstance(result.exception, CommandError)
+        assert 'each trial counts once' in str(result.exception)
+    assert not (tmp_path / 'out').exists()
