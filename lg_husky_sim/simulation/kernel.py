@@ -187,6 +187,7 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
         if clamp > 0.0:
             u[0] = max(-clamp, min(clamp, u[0]))
             u[1] = max(-clamp, min(clamp, u[1]))
+        play_left, play_right = memory[2], memory[3]
         for _ in range(substeps):
             for i in range(n4):
                 start[i] = s[i]
@@ -243,5 +244,10 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
             out[step, i] = row[i]
         for i in range(6):
             out[step, 7 + i] = s[n + i]
+        # Encoders turn with the motors, which run ahead of the wheels within the gears' play.
+        out[step, 0] += (memory[2] - play_left) / period
+        out[step, 1] += (memory[3] - play_right) / period
+        out[step, 7] += memory[2]
+        out[step, 8] += memory[3]
         out[step, 13] = row[7]
         out[step, 14] = row[8]

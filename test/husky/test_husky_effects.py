@@ -292,6 +292,20 @@ def test_latency_slew_and_backlash_are_late(robot: Maker) -> None:
         assert run.column('distance')[-1] < base.column('distance')[-1], effect
 
 
+def test_encoders_run_ahead_of_the_wheels_within_the_play(robot: Maker) -> None:
+    """They sit on the motors: half the play ahead when driving, half behind when reversing."""
+    radius = load_model().parameters['wheel_radius']
+    commands = ((0.6, 0.0),) * 4 + ((-0.6, 0.0),) * 4
+    play = 0.4
+    both = [driven(robot('gear_backlash', play=play), *commands), driven(robot(), *commands)]
+    ahead, free = ([run.column('angle_left')[at] - run.column('distance')[at] / radius
+                    for at in (190, 390)] for run in both)
+    assert ahead[0] - free[0] == pytest.approx(0.5 * play, rel=0.05)
+    assert ahead[1] - free[1] == pytest.approx(-0.5 * play, rel=0.05)
+    rates = both[0].column('wheel_left') - both[1].column('wheel_left')
+    assert max(rates[:15]) > 0.5
+
+
 def test_ripple_comes_once_a_turn(robot: Maker) -> None:
     """One period of the wheel's speed for one turn of the wheel, on its side only."""
     run = driven(robot(Effect('torque_ripple', 'left'), ripple_cos=3.0, ripple_sin=0.0),
