@@ -13,7 +13,8 @@ from lg_husky_sim.diagnosis.doubts import belief, reading_gain
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.regimes import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
-from lg_husky_sim.diagnosis.rounds import CHANGE_SHARE, Rival, Round
+from lg_husky_sim.diagnosis.rivals import CHANGE_SHARE, Rival
+from lg_husky_sim.diagnosis.rounds import Round
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.unnamed import Description, Unnamed

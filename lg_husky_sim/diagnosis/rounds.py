@@ -12,6 +12,7 @@ from lg_husky_sim.diagnosis.evidence import energy, held_out_cost, instability
 from lg_husky_sim.diagnosis.fits import at_nominal, Fit, fit_structure, shared_metric
 from lg_husky_sim.diagnosis.onsets import Onsets
 from lg_husky_sim.diagnosis.refits import look, Looked, Refit, run_refit
+from lg_husky_sim.diagnosis.rivals import adopts, LATER, LEAST_GAIN, rank, Rival, UNSTABLE
 from lg_husky_sim.diagnosis.screening import (
     Projector,
     scan,
@@ -20,7 +21,6 @@ from lg_husky_sim.diagnosis.screening import (
     without_columns,
 )
 from lg_husky_sim.diagnosis.workers import HERE, Workers
-from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
@@ -33,53 +33,10 @@ SERIOUS = 6
 POLISHED = 5
 #: The same where only a change is asked for: its refits have few unknowns.
 OF_CHANGES = (9, 6)
-#: Least held-out gain of an adopted effect, always there or late [nats].
-LEAST_GAIN = (50.0, 60.0)
-#: Least share of the unexplained energy that the first effect must explain, always there or
-#: late: where the rest is near the sensors' noise, and where much remains unexplained.
-LEAST_SHARE = (0.003, 0.02)
-LARGE_SHARE = (0.015, 0.06)
-#: Energy per value of the rest from which much remains unexplained.
-MUCH = 7.0
-#: The same for a further effect: share, or a smaller one with a large gain.
-FURTHER_SHARE = 0.2
-FURTHER_GAIN = (100.0, 0.06)
-#: Largest ratio of losses to gains over held-out blocks; of a change between recordings, where
-#: what the model gets wrong in both adds to the losses.
-UNSTABLE = (0.35, 0.45)
+#: Most steps of such a refit: one that has not converged makes the wrong rival win.
+POLISH = 16
 #: How much more a change must explain after it than in any recording before it.
 PLACEBO = 2.0
-#: Least share of the unexplained energy that a change between recordings must explain: with a
-#: gain above the first and the second number of nats that follow, and after another change.
-CHANGE_SHARE = (0.035, 0.025, 0.5)
-CHANGE_GAIN = (80.0, 250.0)
-#: Share by which an effect that scales all that the ground does must be better than others.
-SWEEPING = 0.15
-#: What a late effect must gain more than the same one without an onset: nats and share.
-LATER = (12.0, 0.15)
-
-
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """
-    A candidate as it was refitted in one round.
-
-    Parameters
-    ----------
-    effect : Effect
-    onset : Onset or None
-    fit : Fit
-    gain : float
-        Drop of the half sum of squares against the round's base, all data [nats].
-    held_out : float
-        The same on blocks that were not fitted [nats].
-    """
-
-    effect: Effect
-    onset: Onset | None
-    fit: Fit
-    gain: float
-    held_out: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +133,7 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
             quick[k] = fit
     near = sorted(quick.items(), key=lambda pair: pair[1].solution.cost)[:finished]
     polished = workers.map(run_refit, [
-        Refit(observations, base, nominal, lean[k], common, 16 if only_late else 6, fit)
+        Refit(observations, base, nominal, lean[k], common, POLISH, fit)
         for k, fit in near])
     fits = [(serious[k], fit) for (k, _), fit in zip(near, polished, strict=True)]
     usable = [(score, fit) for score, fit in fits if fit is not None and not is_eased(fit)]
@@ -206,7 +163,7 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
         gain = _left(observations, rebased, final) - _left(observations, fit, final)
         rivals.append(Rival(fit.structure.effects[-1], score.onset, fit, gain,
                             float(np.sum(cost_base - cost))))
-    rivals.sort(key=lambda r: -_rank(r))
+    rivals.sort(key=lambda r: -rank(r))
     before = energy(observations, rebased, final)
     after = energy(observations, rivals[0].fit, final)
     count = float(np.count_nonzero(final.scale))
@@ -215,7 +172,7 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     unstable = instability(observations, cost_base - cost)
     rest = after / count
     adopted = (rivals[0].held_out > LEAST_GAIN[0] and unstable < UNSTABLE[0] and share > 0.0
-               if eager else _adopts(rivals[0], share, unstable, rest, number, only_late))
+               if eager else adopts(rivals[0], share, unstable, rest, number, only_late))
     return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted, unstable, rest)
 
 
@@ -315,34 +272,6 @@ def beyond_placebo(scores: Sequence[Score]) -> list[Score]:
     list of Score
     """
     return [s for s in scores if s.gain > PLACEBO * s.placebo + LEAST_GAIN[0]]
-
-
-def _rank(rival: Rival) -> float:
-    # Held-out gain, less what an onset must bring, and what scales all that the ground does.
-    effect = rival.effect
-    much = SWEEPING * abs(rival.held_out) if (
-        effect.id == 'terrain_change' and effect.shape == 'damping') else 0.0
-    if rival.onset is None:
-        return rival.held_out - much
-    return rival.held_out - much - LATER[0] - LATER[1] * abs(rival.held_out)
-
-
-def _adopts(best: Rival, share: float, unstable: float, rest: float, number: int,
-            change: bool) -> bool:
-    late = int(best.onset is not None and not change)
-    found = best.fit.parameters
-    if all(found[p.name] == found.entry(p.name).lower == 0.0
-           for p in best.effect.parameters() if not p.fixed):
-        return False
-    if best.held_out < LEAST_GAIN[late] or unstable > UNSTABLE[change]:
-        return False
-    if change:
-        return best.held_out > CHANGE_GAIN[0] and share > (
-            CHANGE_SHARE[2] if number > 0 else CHANGE_SHARE[best.held_out > CHANGE_GAIN[1]])
-    if number > 0:
-        return share > FURTHER_SHARE or (
-            best.held_out > FURTHER_GAIN[0] and share > FURTHER_GAIN[1] and rest < MUCH)
-    return share > (LARGE_SHARE if rest > MUCH else LEAST_SHARE)[late]
 
 
 def screen(observations: Observations, base: Fit, metric_: Metric,

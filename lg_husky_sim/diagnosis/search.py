@@ -20,7 +20,8 @@ from lg_husky_sim.diagnosis.evidence import folds_of
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate
 from lg_husky_sim.diagnosis.onset_placing import begun_late, refined_onset
 from lg_husky_sim.diagnosis.onsets import change_onsets, Onsets, place_onsets, time_onsets
-from lg_husky_sim.diagnosis.rounds import LEAST_GAIN, play_round, Round
+from lg_husky_sim.diagnosis.rivals import LEAST_GAIN
+from lg_husky_sim.diagnosis.rounds import play_round, Round
 from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.model import Structure

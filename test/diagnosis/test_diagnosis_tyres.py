@@ -13,7 +13,8 @@ from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.closed_base import starts, TYRES, with_adhesion
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
 from lg_husky_sim.diagnosis.judge import _rivals
-from lg_husky_sim.diagnosis.rounds import _rank, is_eased, Rival, Round
+from lg_husky_sim.diagnosis.rivals import rank, Rival
+from lg_husky_sim.diagnosis.rounds import is_eased, Round
 from lg_husky_sim.diagnosis.search import search
 from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
@@ -109,8 +110,8 @@ def test_ground_limits_and_rivals_are_what_they_are_called(record: Record) -> No
         ('viscous_asymmetry', 'right', 70.0)]
     ground, other = (Rival(Effect(name), None, fit, 100.0, gain) for name, gain in (
         ('terrain_change', 110.0), ('yaw_scrub_coulomb', 100.0)))
-    assert _rank(ground) < _rank(other)
-    assert _rank(replace(ground, held_out=120.0)) > _rank(other)
+    assert rank(ground) < rank(other)
+    assert rank(replace(ground, held_out=120.0)) > rank(other)
 
 
 @pytest.mark.parametrize(('there', 'instead', 'named'), [
