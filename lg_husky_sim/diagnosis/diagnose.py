@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis import judge
 from lg_husky_sim.diagnosis.confidence import estimates
+from lg_husky_sim.diagnosis.doubts import is_guise
+from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
 from lg_husky_sim.diagnosis.mismatches import mismatches
-from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
-from lg_husky_sim.diagnosis.rounds import MUCH
+from lg_husky_sim.diagnosis.result import Diagnosis, Finding, Verdict
 from lg_husky_sim.diagnosis.search import Progress, Search, search
-from lg_husky_sim.diagnosis.unnamed import described_structure, look_for_unnamed, Unnamed
+from lg_husky_sim.diagnosis.unnamed import described, look_for_unnamed, Unnamed
 from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.errors import DiagnosisError
-from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.identification.problem import Observations, observations
@@ -142,36 +142,51 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
     names = judge.findings(found)
     verdict = Verdict.KNOWN if names else Verdict.NOTHING_MISSING
     unnamed = None
-    if (not names or found.rounds[-1].rest > MUCH) and (
-            found.change is None or judge.is_unnamed(found, None)):
+    if found.change is None or (not names and judge.is_unnamed(found, None)):
         unnamed = look_for_unnamed(whole, found.final)
     model = model_of(found.final, '; '.join(f.statement for f in names)
                      or 'recalibrated, nothing added', with_intervals(found, nominal.parameters))
-    final = plant_of(found.final)
+    final = found.final
     if judge.rolls_without_moving(whole):
         verdict, names = Verdict.UNKNOWN, (judge.no_ground_reaction(found),)
-    elif not names and unnamed is not None and judge.is_unnamed(found, unnamed):
+    elif unnamed is not None and (
+            is_guise(found, unnamed) if names else judge.is_unnamed(found, unnamed)):
         verdict = Verdict.UNKNOWN
-        finding, described = judge.unnamed_finding(found, unnamed)
+        finding, fit = _without_name(found, whole, unnamed)
         names = (finding,)
-        if described is not None:
-            structure, parameters = described_structure(found.final.structure,
-                                                        found.final.parameters, described)
-            model = ModelFile(structure, parameters, finding.statement)
-            final = compile_model(structure).at(parameters)
+        if fit is not None:
+            final, model = fit, model_of(fit, finding.statement)
     residual = whole.measured - found.plain.solution.predicted
     best = found.rounds[-1].base if not found.rounds[-1].adopted else found.final
     culprit = names[0].subsystem if names else None
     listed = mismatches(whole, residual, whole.measured - best.solution.predicted, culprit)
     plain_out, augmented_out = held_out_errors(
-        found.plain, found.final, found.nominal, own, found.rounds[-1].metric)
+        found.plain, final, found.nominal, own, found.rounds[-1].metric)
     return Diagnosis(
         verdict, judge.confidence(found, verdict), names,
         judge.indistinguishable(found), listed,
         judge.recalibration(found, nominal.parameters),
-        errors(plant_of(found.plain), own), errors(final, own),
+        errors(plant_of(found.plain), own), errors(plant_of(final), own),
         plain_out, augmented_out, _remaining(found, unnamed), model,
         model_of(found.plain, 'recalibrated, nothing added'), _notes(found))
+
+
+def _without_name(found: Search, whole: Observations, unnamed: Unnamed
+                  ) -> tuple[Finding, Fit | None]:
+    # A guise stays in the model only where the smooth effort needs it.
+    options = [(found.final, unnamed)]
+    if found.final is not found.plain:
+        options.append((found.plain, look_for_unnamed(whole, found.plain)))
+    folds, made = folds_of(whole), []
+    for base, looked in options:
+        finding, description = judge.unnamed_finding(found, looked)
+        fit = None if description is None else described(
+            whole, base, found.nominal, looked, description)
+        used = found.final if fit is None else fit
+        cost = float(np.sum(held_out_cost(whole, used, unnamed.metric, folds)))
+        made.append((cost + judge.NEAR_NATS * len(used.structure.effects), finding, fit))
+    _, finding, fit = min(made, key=lambda one: one[0])
+    return finding, fit
 
 
 def _remaining(found: Search, unnamed: Unnamed | None) -> str:

@@ -5,7 +5,8 @@ What a finding leaves that its name should have explained.
 
 A name outside the catalogue often comes in the guise of one inside it: a gyro that clips looks
 like one that reads too little. The guise leaves a residual that is a plain function of what the
-sensor should read; the true effect does not.
+sensor should read; the true effect does not. A guise among the physics leaves much that another
+effect, or a smooth effort elsewhere in the graph, still explains, beside what it gained itself.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import math
 from lg_husky_sim.diagnosis.evidence import FOLDS, folds_of
 from lg_husky_sim.diagnosis.fits import Fit, shared_metric
 from lg_husky_sim.diagnosis.screening import Projector
-from lg_husky_sim.diagnosis.unnamed import ridge
+from lg_husky_sim.diagnosis.search import Search
+from lg_husky_sim.diagnosis.unnamed import ridge, Unnamed
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -27,6 +29,63 @@ THIN, THIN_WEIGHT = 400.0, 0.5
 #: Most that a remaining function of the reading takes away, and the part of the finding's gain
 #: at which half of it is taken.
 GUISE_WEIGHT, GUISE_HALF = 0.6, 0.1
+#: Part of what the named effects gained from which a further effect that was not adopted, or a
+#: smooth effort in another subsystem, says that the names are a guise; least such gain [nats].
+FURTHER_PART, SMOOTH_PART, LEAST_LEFT = 0.2, 0.4, 85.0
+#: The same for a smooth effort anywhere, and the share of what is left that it must explain then.
+ANYWHERE_PART, ANYWHERE_SHARE = 0.2, 0.2
+#: The smooth effort that an effect is itself: where it explains more than any other, the element
+#: is right and only the shape of its law is not.
+OWN = {
+    'torque_ripple': ('smooth_torque', 'angle'), 'coulomb_drivetrain': (
+        'smooth_torque', 'wheel_rate'), 'viscous_asymmetry': ('smooth_torque', 'wheel_rate'),
+    'rolling_resistance': ('smooth_force', 'forward'), 'quadratic_drag': (
+        'smooth_force', 'forward'), 'slope': ('smooth_force', 'heading'),
+    'yaw_scrub_coulomb': ('smooth_moment', 'yaw'), 'driver_deadband': (
+        'smooth_voltage', 'voltage'), 'voltage_saturation': ('smooth_voltage', 'voltage')}
+#: Gain below which a name must explain every stretch [nats], and the losses that it may have.
+SLIGHT_GAIN, SLIGHT_UNSTABLE = 200.0, 0.12
+
+
+def further_gain(search: Search) -> float:
+    """Return the held-out gain of the best effect that was not adopted after others [nats]."""
+    last = search.rounds[-1]
+    if last.adopted or len(search.rounds) < 2:
+        return 0.0
+    return max((r.held_out for r in last.rivals), default=0.0)
+
+
+def is_guise(search: Search, unnamed: Unnamed) -> bool:
+    """
+    Return whether what was named looks like a guise of something else.
+
+    Parameters
+    ----------
+    search : Search
+        That adopted something.
+    unnamed : Unnamed
+        What smooth efforts explain on top of it.
+
+    Returns
+    -------
+    bool
+    """
+    named = [r for r in search.rounds if r.adopted]
+    gained = sum(r.rivals[0].held_out for r in named)
+    if gained < SLIGHT_GAIN and named[0].instability > SLIGHT_UNSTABLE:
+        return True
+    effects = [r.rivals[0].effect for r in named]
+    places = {effect.kind.subsystem for effect in effects}
+    own = {OWN[effect.id] for effect in effects if effect.id in OWN}
+    mine = max((d.held_out for d in unnamed.descriptions
+                if (d.effect.id, d.effect.shape) in own), default=0.0)
+    foreign = [d for d in unnamed.descriptions if d.held_out > mine]
+    elsewhere = [d for d in foreign if d.effect.kind.subsystem not in places]
+    left = [(further_gain(search), FURTHER_PART)]
+    left += [(d.held_out, SMOOTH_PART) for d in elsewhere[:1]]
+    if foreign and unnamed.share_of(foreign[0]) > ANYWHERE_SHARE:
+        left.append((foreign[0].held_out, ANYWHERE_PART))
+    return any(gain > max(LEAST_LEFT, part * gained) for gain, part in left)
 
 
 def reading_gain(observations: Observations, fit: Fit) -> float:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
-from lg_husky_sim.diagnosis.doubts import belief, reading_gain
+from lg_husky_sim.diagnosis.doubts import belief, further_gain, reading_gain
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.regimes import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
@@ -40,6 +40,8 @@ NO_GRIP = 0.015
 #: A rival within this share of the winner's held-out gain, or this many nats, is as good.
 NEAR_SHARE = 0.06
 NEAR_NATS = 10.0
+#: Parameter whose sign says to which side an effect acts: positive to the left.
+SIDE_OF = {'yaw_pull': 'pull_moment'}
 
 
 def onset_words(onset: Onset | None) -> str:
@@ -63,6 +65,12 @@ def in_words(numbers: Sequence[Estimate]) -> str:
 def _side_words(effect: Effect) -> str:
     return '' if effect.side in ('none', '') else {
         'both': ' (both sides)', 'left': ' (left side)', 'right': ' (right side)'}[effect.side]
+
+
+def _acting_side(effect: Effect, numbers: Sequence[Estimate]) -> str:
+    # The side of an effect without one, where the sign of a number is a side.
+    value = next((e.value for e in numbers if e.name == SIDE_OF.get(effect.id)), 0.0)
+    return effect.side if value == 0.0 else 'left' if value > 0.0 else 'right'
 
 
 def is_near(rival: Rival, best: Rival) -> bool:
@@ -120,8 +128,8 @@ def findings(search: Search) -> tuple[Finding, ...]:
                      f'{in_words(numbers)}. It shows {regime} and explains '
                      f'{100.0 * min(max(one.share, 0.0), 1.0):.0f} % of what was unexplained.')
         found.append(Finding(
-            effect.id, effect.side, effect.kind.subsystem.value, effect.kind.elements, regime,
-            onset, numbers,
+            effect.id, _acting_side(effect, numbers), effect.kind.subsystem.value,
+            effect.kind.elements, regime, onset, numbers,
             best.held_out, p_value(best.gain, len(names), hypotheses), one.share,
             _rivals(one, effect), statement[0].upper() + statement[1:]))
     return tuple(found)
@@ -267,9 +275,11 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
         effect = near.effect if near is not None else first.scores[0].signature.candidate.effect
         kind = effect.kind
         gain = near.held_out if near is not None else first.scores[0].gain
+        doubt = ('leaves too much to be its name' if first.adopted else 'that not steadily '
+                 'enough over held-out stretches to be its name')
         words = (f'Something is missing that is not in the catalogue; the nearest entry, '
-                 f'{effect.id}, explains {100.0 * max(first.share, 0.0):.1f} % of it, and that '
-                 'not steadily enough over held-out stretches to be its name.')
+                 f'{effect.id}, explains {100.0 * max(first.share, 0.0):.1f} % of it, and '
+                 f'{doubt}.')
     return Finding('unknown', 'none', kind.subsystem.value, kind.elements, 'not determined',
                    None, (), gain, p_value(gain, 9, len(candidates())), unnamed.share, rivals,
                    words), best if described else None
@@ -299,7 +309,7 @@ def confidence(search: Search, verdict: Verdict) -> float:
     for rival in first.rivals:
         by_name[rival.effect.id] = max(by_name.get(rival.effect.id, -np.inf), rival.held_out)
     gains = sorted(by_name.values(), reverse=True)
-    remaining = reading_gain(search.observations, search.final)
+    remaining = max(reading_gain(search.observations, search.final), further_gain(search))
     return name_confidence(gains) * belief(strongest, first.share, remaining)
 
 

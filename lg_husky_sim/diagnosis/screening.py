@@ -157,7 +157,8 @@ class Projector:
         self.size = residual.size
         slope = metric.whiten(observations, jacobian)
         prior = np.diag(1.0 / deviations)
-        self.basis = np.linalg.qr(np.vstack([slope, prior]))[0]
+        self.basis, self.triangle = np.linalg.qr(np.vstack([slope, prior]))
+        self.pull = pull
         self.residual = self._project(np.concatenate(
             [metric.whiten(observations, residual), pull]))
         # The same for columns that are filtered only: what common errors explain comes first.
@@ -171,6 +172,12 @@ class Projector:
     def _project(self, rows: FloatArray) -> FloatArray:
         projected: FloatArray = rows - self.basis @ (self.basis.T @ rows)
         return projected
+
+    def recalibrated(self, residual: FloatArray) -> FloatArray:
+        """Return how the recalibration would move for a residual, shape (n_unknowns,)."""
+        rows = np.concatenate([self.metric.whiten(self.observations, residual), self.pull])
+        step: FloatArray = np.linalg.lstsq(self.triangle, self.basis.T @ rows, rcond=None)[0]
+        return step
 
     def projected(self, columns: FloatArray) -> FloatArray:
         """Return columns whitened and projected, shape (n_values + n_unknowns, k)."""

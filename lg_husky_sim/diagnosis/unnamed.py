@@ -17,13 +17,14 @@ import itertools
 import math
 
 from lg_husky_sim.diagnosis.candidates import Candidate
-from lg_husky_sim.diagnosis.evidence import energy, FOLDS, folds_of
-from lg_husky_sim.diagnosis.fits import extras_of, Fit, shared_metric
+from lg_husky_sim.diagnosis.evidence import FOLDS, folds_of, held_out_cost
+from lg_husky_sim.diagnosis.fits import extras_of, Fit, fit_structure, shared_metric
 from lg_husky_sim.diagnosis.screening import Projector, Signature, signatures_of
 from lg_husky_sim.husky.effects import descriptions, Effect
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations, PERIOD, simulate_piece
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.kernel import COLUMNS
@@ -36,6 +37,8 @@ _SOURCE = {'forward': 'forward', 'yaw': 'yaw_rate', 'x': 'x', 'y': 'y',
 #: Size of a knot when its column is taken, by the effect.
 _SIZE = {'smooth_force': 5.0, 'smooth_moment': 1.0, 'smooth_torque': 0.5, 'smooth_voltage': 0.5}
 _PERIODIC = ('heading', 'angle', 'angle_left', 'angle_right')
+#: Steps of a refit with a description.
+STEPS = 16
 KNOTS = tuple(f'knot_{i}' for i in range(1, 10))
 
 
@@ -127,7 +130,8 @@ def description_signatures(observations: Observations, structure: Structure,
 
 
 def describe(observations: Observations, signatures: Sequence[Signature], projector: Projector,
-             residual: FloatArray, folds: FloatArray, count: int) -> tuple[Description, ...]:
+             residual: FloatArray, jacobian: FloatArray, folds: FloatArray, count: int
+             ) -> tuple[Description, ...]:
     """
     Rank descriptions by what they explain of held-out blocks.
 
@@ -140,6 +144,8 @@ def describe(observations: Observations, signatures: Sequence[Signature], projec
         Of the fitted model, under a metric for which the signatures are no noise.
     residual : numpy.ndarray, shape (n_values,)
         Of the fitted model.
+    jacobian : numpy.ndarray, shape (n_values, n_unknowns)
+        Of the same: its unknowns move with the description.
     folds : numpy.ndarray, shape (n_values,)
         Fold of each value.
     count : int
@@ -162,7 +168,8 @@ def describe(observations: Observations, signatures: Sequence[Signature], projec
             left = target[out] - columns[out] @ weights
             held_out += 0.5 * float(target[out] @ target[out] - left @ left)
         weights = ridge(columns, target)
-        left = (residual - signature.columns @ weights) * scale
+        left = residual - signature.columns @ weights
+        left = (left - jacobian @ projector.recalibrated(left)) * scale
         names = [n for n in signature.start if n in KNOTS]
         knots = tuple(float(w) * signature.start[n] for w, n in zip(weights, names, strict=True))
         found.append(Description(
@@ -180,30 +187,6 @@ def ridge(columns: FloatArray, target: FloatArray) -> FloatArray:
     return weights
 
 
-def described_structure(structure: Structure, parameters: Parameters, description: Description
-                        ) -> tuple[Structure, Parameters]:
-    """
-    Put a description into a model.
-
-    Parameters
-    ----------
-    structure : Structure
-    parameters : Parameters
-    description : Description
-
-    Returns
-    -------
-    Structure
-    Parameters
-    """
-    values = dict(zip(KNOTS, description.knots, strict=True))
-    values['range_low'], values['range_high'] = description.range
-    entries = [p.parameter(min(max(values[p.name], p.lower), p.upper))
-               for p in description.effect.parameters()]
-    return (structure.with_effect(replace(description.effect, late=False)),
-            parameters.with_entries(*entries))
-
-
 @dataclass(frozen=True, eq=False)
 class Unnamed:
     """
@@ -217,19 +200,23 @@ class Unnamed:
         Scaled sum of squares before [sensor noise per value, summed].
     count : int
         Values.
+    metric : Metric
+        Under which it was counted.
     """
 
     descriptions: tuple[Description, ...]
     energy: float
     count: int
+    metric: Metric
 
     @property
     def share(self) -> float:
         """Share of the unexplained energy that the best description explains."""
-        if not self.descriptions:
-            return 0.0
-        return (self.energy - self.descriptions[0].energy) / max(
-            self.energy - 0.5 * self.count, 1e-9)
+        return self.share_of(self.descriptions[0]) if self.descriptions else 0.0
+
+    def share_of(self, description: Description) -> float:
+        """Return the share of the unexplained energy that a description explains."""
+        return (self.energy - description.energy) / max(self.energy - 0.5 * self.count, 1e-9)
 
     @property
     def held_out(self) -> float:
@@ -261,7 +248,47 @@ def look_for_unnamed(observations: Observations, fit: Fit) -> Unnamed:
     residual = observations.measured - fit.solution.predicted
     projector = Projector(observations, metric, residual, fit.solution.jacobian, deviations,
                           pull)
-    ranked = describe(observations, signatures, projector, residual, folds_of(observations),
-                      FOLDS)
-    return Unnamed(ranked, energy(observations, fit, metric),
-                   int(np.count_nonzero(metric.scale)))
+    jacobian = fit.solution.jacobian
+    ranked = describe(observations, signatures, projector, residual, jacobian,
+                      folds_of(observations), FOLDS)
+    left = (residual - jacobian @ projector.recalibrated(residual)) * metric.scale
+    return Unnamed(ranked, float(np.sum(np.minimum(left ** 2, 1e6))),
+                   int(np.count_nonzero(metric.scale)), metric)
+
+
+def described(observations: Observations, fit: Fit, nominal: Parameters, unnamed: Unnamed,
+              description: Description) -> Fit | None:
+    """
+    Put a description into a model and refit both.
+
+    Parameters
+    ----------
+    observations : Observations
+    fit : Fit
+        That lacks something.
+    nominal : Parameters
+    unnamed : Unnamed
+        What was looked at on top of it.
+    description : Description
+        One of these.
+
+    Returns
+    -------
+    Fit or None
+        None where the model predicts held-out data no better than before.
+    """
+    values = dict(zip(KNOTS, description.knots, strict=True))
+    values['range_low'], values['range_high'] = description.range
+    kind = description.effect.kind
+    values = {p.name: min(max(values[p.name], p.lower), p.upper) for p in kind.parameters}
+    size = max(abs(v) for v in description.knots)
+    again = fit_structure(
+        observations, fit.structure.with_effect(replace(description.effect, late=False)), nominal,
+        unnamed.metric, {**fit.solution.values, **values},
+        {**fit.parameters, **dict.fromkeys(KNOTS, size), 'range_low': values['range_low'],
+         'range_high': values['range_high']}, STEPS)
+    folds = folds_of(observations)
+    if again is None or not np.sum(held_out_cost(observations, again, unnamed.metric, folds)) < (
+            np.sum(held_out_cost(observations, fit, unnamed.metric, folds))):
+        return None
+    return again

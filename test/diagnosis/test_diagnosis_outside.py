@@ -1,0 +1,100 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is not in the catalogue is not given a name of it, and is modelled all the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.diagnose import Case, diagnose
+from lg_husky_sim.diagnosis.doubts import belief, is_guise
+from lg_husky_sim.diagnosis.fits import recalibrate
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.rivals import adopts, Rival
+from lg_husky_sim.diagnosis.unnamed import KNOTS, look_for_unnamed
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.identification.problem import observations
+from lg_husky_sim.recording import Recording, segments
+import numpy as np
+import pytest
+
+STEPS = ((1.0, 0.0, 0.0), (2.0, 0.8, 0.0), (2.0, 0.5, 0.8), (2.0, 0.0, 0.9), (2.0, -0.5, 0.5),
+         (2.0, 0.8, -0.8), (2.0, 0.0, -0.9), (2.0, 0.4, -0.4), (2.0, 0.0, 0.0))
+#: A force ahead that grows with the square of the yaw rate, as of a mass that sits in front.
+RANGE = {'range_low': -1.0, 'range_high': 1.0}
+AHEAD = {**RANGE, **{name: 40.0 * float(rate) ** 2
+                     for name, rate in zip(KNOTS, np.linspace(-1.0, 1.0, 9), strict=True)}}
+FORCE = Effect('smooth_force', shape='yaw')
+Record = Callable[..., Recording]
+
+
+def diagnosed(record: Record, effects: Mapping[Effect, Mapping[str, float]]) -> Case:
+    model = load_model()
+    structure, parameters = model.structure, model.parameters
+    for effect, values in effects.items():
+        structure = structure.with_effect(effect)
+        parameters = parameters.with_entries(*effect_entries(effect, values))
+    plant = compile_model(structure).at(parameters)
+    return diagnose([record('ahead', plant, STEPS, 1), record('back', plant, STEPS[::-1], 2)],
+                    model, lambda text, share: None)
+
+
+def test_effort_without_a_name_is_described_and_modelled(record: Record) -> None:
+    found = diagnosed(record, {FORCE: AHEAD}).diagnosis
+    assert found.verdict is Verdict.UNKNOWN
+    (finding,) = found.findings
+    assert (finding.effect, finding.subsystem) == ('unknown', 'translation')
+    assert 'smooth function of yaw' in finding.statement
+    assert [(e.id, e.shape) for e in found.model.structure.effects] == [('smooth_force', 'yaw')]
+    for name in ('position_rmse_m', 'forward_rmse'):
+        assert found.held_out_augmented[name] < 0.8 * found.held_out_plain[name], name
+
+
+def test_name_that_leaves_an_effort_elsewhere_is_a_guise(record: Record) -> None:
+    """Scrub that grows with speed is in the catalogue; beside that force it is half the truth."""
+    scrub = {Effect('yaw_scrub_speed'): {'scrub_slope': 6.0}}
+    alone = diagnosed(record, scrub)
+    assert [f.effect for f in alone.diagnosis.findings] == ['yaw_scrub_speed']
+    assert not is_guise(alone.search, look_for_unnamed(
+        alone.search.observations, alone.search.final))
+    both = diagnosed(record, {**scrub, FORCE: AHEAD})
+    assert [r.rivals[0].effect.id for r in both.search.rounds if r.adopted]
+    assert both.diagnosis.verdict is Verdict.UNKNOWN
+
+
+def test_smooth_effort_moves_the_recalibration_along(record: Record) -> None:
+    """Its share is counted with the nominal numbers refitted: they had stood in for it."""
+    model = load_model()
+    plant = compile_model(model.structure.with_effect(FORCE)).at(
+        model.parameters.with_entries(*effect_entries(FORCE, AHEAD)))
+    data = observations(segments(record('ahead', plant, STEPS, 1)))
+    found = look_for_unnamed(data, recalibrate(data, model.structure, model.parameters))
+    assert found.descriptions[0].effect == FORCE
+    assert found.share > 0.3
+    assert found.share == found.share_of(found.descriptions[0])
+    shares = [found.share_of(d) for d in found.descriptions]
+    assert min(shares) > -0.05
+
+
+@pytest.mark.parametrize(('gain', 'share', 'unstable', 'number', 'change', 'adopted'), [
+    (300.0, 0.01, 0.1, 0, False, True), (300.0, 0.002, 0.1, 0, False, False),
+    (300.0, 0.01, 0.4, 0, False, False), (300.0, 0.1, 0.1, 1, False, True),
+    (300.0, 0.04, 0.1, 1, False, False), (1500.0, 0.04, 0.1, 1, False, True),
+    (300.0, 0.04, 0.4, 0, True, True), (300.0, 0.1, 0.05, 1, True, True),
+    (300.0, 0.2, 0.2, 1, True, False), (700.0, 0.05, 0.01, 1, True, True),
+    (90.0, 0.6, 0.4, 1, True, True), (90.0, 0.3, 0.01, 1, True, False)])
+def test_effect_is_adopted_for_gain_share_and_steadiness(
+        gain: float, share: float, unstable: float, number: int, change: bool, adopted: bool,
+        diagnosed: Callable[[str], Case]) -> None:
+    fit = diagnosed('rotation').search.final
+    rival = Rival(fit.structure.effects[-1], None, fit, gain, gain)
+    assert adopts(rival, share, unstable, 1.0, number, change) is adopted
+
+
+def test_a_name_is_believed_less_the_more_it_leaves() -> None:
+    assert belief(5000.0, 0.9, 0.0) > 0.99
+    assert belief(5000.0, 0.9, 500.0) == pytest.approx(0.7, abs=0.01)
+    assert belief(100.0, 0.1, 0.0) < 0.7
