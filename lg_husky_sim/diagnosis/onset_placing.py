@@ -22,6 +22,8 @@ REACH = 1.2
 #: Drop of the cost without the effect before an onset, its numbers unchanged, and after a refit,
 #: from which it begins there [nats].
 ABSENT, LATE = 5.0, 10.0
+#: Both for a change between recordings, whose model is less exact.
+LATE_CHANGE = 60.0
 #: Onsets within this many nats of the best are as good; their middle is taken.
 FLAT = 1.0
 
@@ -78,13 +80,12 @@ def refined_onset(observations: Observations, fit: Fit, metric: Metric,
     if change is not None:
         first = observations.recordings.index(change.recording)
         coarse = [o for o in coarse if o.recording in observations.recordings[first:]]
+    if onset not in coarse:
+        coarse.append(onset)
     if onset.recording:
         # Onsets in a named recording lie on one line through all recordings.
         coarse.sort(key=lambda o: (observations.recordings.index(o.recording), o.value))
-    if onset not in coarse:
-        coarse.append(onset)
-    costs = [_cost(observations, fit, metric, o) for o in coarse]
-    centre = coarse[int(np.argmin(costs))]
+    centre = _middle(coarse, [_cost(observations, fit, metric, o) for o in coarse])
     step = ONSET_STEP
     if onset.kind is not OnsetKind.TIME and len(coarse) > 1:
         step = abs(coarse[1].value - coarse[0].value)
@@ -95,7 +96,8 @@ def refined_onset(observations: Observations, fit: Fit, metric: Metric,
     return _middle(fine, [_cost(observations, fit, metric, o) for o in fine])
 
 
-def begun_late(observations: Observations, fit: Fit, nominal: Parameters, metric: Metric) -> Fit:
+def begun_late(observations: Observations, fit: Fit, nominal: Parameters, metric: Metric,
+               change: Onset | None = None) -> Fit:
     """
     Let the newest effect begin late, if it is absent before.
 
@@ -106,28 +108,35 @@ def begun_late(observations: Observations, fit: Fit, nominal: Parameters, metric
     ----------
     observations : Observations
     fit : Fit
-        Without an onset.
+        Without an onset, or with that of a change.
     nominal : Parameters
     metric : Metric
+    change : Onset, optional
+        The beginning of the later recordings, if a change was asked for: a moment inside them is
+        tried.
 
     Returns
     -------
     Fit
-        The same where the effect is always there.
+        The same where the effect is there from the beginning.
     """
     structure = fit.structure
     effect = structure.effects[-1]
-    onsets = [onset for family in (time_onsets(observations), place_onsets(observations))
-              for onset, _ in family.onsets]
-    if structure.onset is not None or not onsets:
+    families = (time_onsets(observations), place_onsets(observations))
+    onsets = [onset for family in families for onset, _ in family.onsets]
+    if change is not None:
+        later = observations.recordings[observations.recordings.index(change.recording):]
+        onsets = [onset for onset, _ in families[0].onsets if onset.recording in later]
+    if structure.onset != change or not onsets:
         return fit
+    absent, least = (ABSENT, LATE) if change is None else (LATE_CHANGE, LATE_CHANGE)
     late = replace(structure, effects=(*structure.effects[:-1], replace(effect, late=True)),
                    onset=onsets[0])
     costs = [_cost(observations, replace(fit, structure=late), metric, o) for o in onsets]
     best = int(np.argmin(costs))
     white = metric.whiten(observations, observations.measured - fit.solution.predicted)
     before = 0.5 * float(white @ white)
-    if before - costs[best] < ABSENT:
+    if before - costs[best] < absent:
         return fit
     sizes = {**fit.parameters, **fit.solution.values}
     again = fit_structure(observations, replace(late, onset=onsets[best]), nominal, metric,
@@ -135,4 +144,4 @@ def begun_late(observations: Observations, fit: Fit, nominal: Parameters, metric
     if again is None:
         return fit
     white = metric.whiten(observations, observations.measured - again.solution.predicted)
-    return again if before - 0.5 * float(white @ white) > LATE else fit
+    return again if before - 0.5 * float(white @ white) > least else fit

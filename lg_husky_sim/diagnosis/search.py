@@ -135,8 +135,8 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         if not one.adopted:
             break
         found = one.rivals[0].fit
-        if masks and change is None and number == 0:
-            found = begun_late(observations, found, nominal, one.metric)
+        if masks and number == 0:
+            found = begun_late(observations, found, nominal, one.metric, change)
             one = replace(one, rivals=(replace(one.rivals[0], fit=found, effect=(
                 found.structure.effects[-1]), onset=found.structure.onset), *one.rivals[1:]))
             rounds[-1] = one

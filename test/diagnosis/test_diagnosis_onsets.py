@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.fits import first_metric, Fit, fit_structure
-from lg_husky_sim.diagnosis.onset_placing import refined_onset
+from lg_husky_sim.diagnosis.onset_placing import begun_late, refined_onset
 from lg_husky_sim.diagnosis.onsets import change_onsets
 from lg_husky_sim.diagnosis.screening import Projector
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
@@ -102,14 +102,19 @@ def test_a_place_changes_nothing_before_the_change_and_less_than_all_after_it(
     assert len(plant.in_recording('before0', ('before0',)).sets) == 1
 
 
-def test_the_place_is_found_finely(data: Observations) -> None:
-    fit, onset = sloped(1.0)
-    seen = data.predict(compile_model(fit.structure).at(fit.parameters))
-    exact = Observations(tuple(
+def measured_as(data: Observations, seen: np.ndarray) -> Observations:
+    """Return data whose values are others."""
+    return Observations(tuple(
         replace(piece, channels=tuple(
             replace(c, values=seen[s.first:s.last]) for c, s in zip(
                 piece.channels, [s for s in data.slices if s.piece == k], strict=True)))
         for k, piece in enumerate(data.pieces)))
+
+
+def test_the_place_is_found_finely(data: Observations) -> None:
+    fit, onset = sloped(1.0)
+    seen = data.predict(compile_model(fit.structure).at(fit.parameters))
+    exact = measured_as(data, seen)
     start = replace(fit.structure, onset=replace(onset, value=1.3))
     values = {name: fit.parameters[name] for name in fit.parameters}
     metric = first_metric(exact, seen)
@@ -120,6 +125,32 @@ def test_the_place_is_found_finely(data: Observations) -> None:
     assert better.kind is OnsetKind.PLACE_ABOVE
     assert better.recording == 'after0'
     assert better.value == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize('begins', [None, 6.0])
+def test_a_change_that_begins_inside_a_recording_is_seen(data: Observations,
+                                                         begins: float | None) -> None:
+    """However much it gains altogether, it is not put where it harms."""
+    given = change(data)
+    true = given if begins is None else replace(given, value=begins)
+    fit, _ = sloped(0.0)
+    structure = replace(fit.structure, onset=true)
+    noise = 0.01 * np.random.default_rng(3).standard_normal(data.measured.size)
+    exact = measured_as(data, noise + data.predict(
+        compile_model(structure).at(fit.parameters)))
+    values = {name: fit.parameters[name] for name in fit.parameters}
+    metric = Metric(np.full(noise.size, 100.0), {name: np.ones(1) for name in data.channels})
+    held = fit.parameters.with_entries(*(
+        replace(p, tolerance=0.0) for p in fit.parameters.entries))
+    early = fit_structure(exact, replace(structure, onset=given), held, metric, values, values, 6)
+    assert early is not None
+    found = begun_late(exact, early, held, metric, given).structure.onset
+    assert found is not None
+    if begins is None:
+        assert found == given
+    else:
+        assert found.recording == 'after0'
+        assert found.value == pytest.approx(begins, abs=1.0)
 
 
 def test_a_change_is_no_model_error_mirrored(data: Observations) -> None:
