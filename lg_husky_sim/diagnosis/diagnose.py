@@ -142,8 +142,8 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
     names = judge.findings(found)
     verdict = Verdict.KNOWN if names else Verdict.NOTHING_MISSING
     unnamed = None
-    if found.change is None or (not names and judge.is_unnamed(found, None)):
-        unnamed = look_for_unnamed(whole, found.final)
+    if found.change is None or not names:
+        unnamed = look_for_unnamed(whole, found.final, found.change)
     model = model_of(found.final, '; '.join(f.statement for f in names)
                      or 'recalibrated, nothing added', with_intervals(found, nominal.parameters))
     final = found.final
@@ -176,12 +176,13 @@ def _without_name(found: Search, whole: Observations, unnamed: Unnamed
     # A guise stays in the model only where the smooth effort needs it.
     options = [(found.final, unnamed)]
     if found.final is not found.plain:
-        options.append((found.plain, look_for_unnamed(whole, found.plain)))
+        options.append((found.plain, look_for_unnamed(whole, found.plain, found.change)))
     folds, made = folds_of(whole), []
     for base, looked in options:
         finding, description = judge.unnamed_finding(found, looked)
         fit = None if description is None else described(
             whole, base, found.nominal, looked, description)
+        fit = None if fit is None else ordered(fit, whole.recordings)
         used = found.final if fit is None else fit
         cost = float(np.sum(held_out_cost(whole, used, unnamed.metric, folds)))
         made.append((cost + judge.NEAR_NATS * len(used.structure.effects), finding, fit))

@@ -168,7 +168,7 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     search : Search
         That adopted nothing.
     unnamed : Unnamed or None
-        What smooth descriptions explain, if it was looked at; a change is judged without.
+        What smooth descriptions explain, if it was looked at.
 
     Returns
     -------
@@ -180,7 +180,9 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     tried = max((r.held_out for r in first.rivals), default=0.0)
     if search.change is not None:
         return screened > SCREENED_CHANGE or (
-            tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1])
+            tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]) or (
+            unnamed is not None and unnamed.held_out > CERTAIN_CHANGE
+            and unnamed.share > CHANGE_SHARE[1])
     return tried > EVIDENT or (screened > CERTAIN and tried > FOLLOWED) or (
         unnamed is not None and unnamed.held_out > EVIDENT and unnamed.share > SMOOTH_SHARE)
 

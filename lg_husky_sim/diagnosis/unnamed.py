@@ -20,7 +20,7 @@ from lg_husky_sim.diagnosis.candidates import Candidate
 from lg_husky_sim.diagnosis.evidence import FOLDS, folds_of, held_out_cost
 from lg_husky_sim.diagnosis.fits import extras_of, Fit, fit_structure, shared_metric
 from lg_husky_sim.diagnosis.screening import Projector, Signature, signatures_of
-from lg_husky_sim.husky.effects import descriptions, Effect
+from lg_husky_sim.husky.effects import descriptions, Effect, Onset
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import Plant
@@ -37,6 +37,9 @@ _SOURCE = {'forward': 'forward', 'yaw': 'yaw_rate', 'x': 'x', 'y': 'y',
 #: Size of a knot when its column is taken, by the effect.
 _SIZE = {'smooth_force': 5.0, 'smooth_moment': 1.0, 'smooth_torque': 0.5, 'smooth_voltage': 0.5}
 _PERIODIC = ('heading', 'angle', 'angle_left', 'angle_right')
+#: Descriptions of a change that are compared with earlier recordings, from which gain on [nats],
+#: and by how much they must explain more than in earlier ones, and than if always there.
+FIRST, LEAST, PLACEBO, ALWAYS = 3, 85.0, 2.0, 1.5
 #: Steps of a refit with a description.
 STEPS = 16
 KNOTS = tuple(f'knot_{i}' for i in range(1, 10))
@@ -59,6 +62,8 @@ class Description:
         Values at the knots [unit of the effort].
     range : tuple of float
         First and last knot [unit of the argument].
+    onset : Onset or None
+        Where it begins, if a change between recordings was asked for.
     """
 
     effect: Effect
@@ -66,6 +71,7 @@ class Description:
     energy: float
     knots: tuple[float, ...]
     range: tuple[float, float]  # noqa: A003
+    onset: Onset | None = None
 
     @property
     def argument(self) -> str:
@@ -224,7 +230,8 @@ class Unnamed:
         return self.descriptions[0].held_out if self.descriptions else 0.0
 
 
-def look_for_unnamed(observations: Observations, fit: Fit) -> Unnamed:
+def look_for_unnamed(observations: Observations, fit: Fit, change: Onset | None = None
+                     ) -> Unnamed:
     """
     Rank smooth descriptions on top of a fit.
 
@@ -232,6 +239,10 @@ def look_for_unnamed(observations: Observations, fit: Fit) -> Unnamed:
     ----------
     observations : Observations
     fit : Fit
+    change : Onset, optional
+        The beginning of the later recordings, if a change was asked for: efforts that begin there
+        are described then, and only the first few that explain more than they would if switched
+        on in earlier recordings instead, or in all.
 
     Returns
     -------
@@ -240,6 +251,9 @@ def look_for_unnamed(observations: Observations, fit: Fit) -> Unnamed:
     plant = compile_model(fit.structure).at(fit.parameters)
     signatures = description_signatures(observations, fit.structure, fit.parameters,
                                         extras_of(fit), plant, fit.solution.predicted)
+    if change is not None:
+        whole = signatures
+        signatures = switched(observations, whole, change)
     metric = shared_metric(observations, fit, signatures)
     unknowns = fit.solution.unknowns
     deviations = np.array([u.deviation for u in unknowns])
@@ -248,12 +262,52 @@ def look_for_unnamed(observations: Observations, fit: Fit) -> Unnamed:
     residual = observations.measured - fit.solution.predicted
     projector = Projector(observations, metric, residual, fit.solution.jacobian, deviations,
                           pull)
-    jacobian = fit.solution.jacobian
-    ranked = describe(observations, signatures, projector, residual, jacobian,
-                      folds_of(observations), FOLDS)
+    jacobian, folds = fit.solution.jacobian, folds_of(observations)
+
+    def ranking(shown: Sequence[Signature]) -> tuple[Description, ...]:
+        return describe(observations, shown, projector, residual, jacobian, folds, FOLDS)
+    ranked = ranking(signatures)
+    if change is not None:
+        beyond = []
+        for one in [d for d in ranked[:FIRST] if d.held_out > LEAST]:
+            own = [s for s in whole if s.candidate.effect == one.effect]
+            placebo = sum(
+                max(ranking(switched(observations, own, change, earlier))[0].held_out, 0.0)
+                for earlier in observations.recordings[
+                    :observations.recordings.index(change.recording)])
+            always = ranking(own)[0].held_out
+            if one.held_out > max(PLACEBO * placebo, ALWAYS * always):
+                beyond.append(replace(one, effect=replace(one.effect, late=True), onset=change))
+        ranked = tuple(beyond)
     left = (residual - jacobian @ projector.recalibrated(residual)) * metric.scale
     return Unnamed(ranked, float(np.sum(np.minimum(left ** 2, 1e6))),
                    int(np.count_nonzero(metric.scale)), metric)
+
+
+def switched(observations: Observations, signatures: Sequence[Signature], change: Onset,
+             only: str = '') -> list[Signature]:
+    """
+    Return signatures that are on in some recordings only.
+
+    Parameters
+    ----------
+    observations : Observations
+    signatures : sequence of Signature
+    change : Onset
+        The beginning of the later recordings.
+    only : str
+        The one recording in which they are on; all later ones where it is empty.
+
+    Returns
+    -------
+    list of Signature
+    """
+    names = observations.recordings
+    chosen = {only} if only else set(names[names.index(change.recording):])
+    on = np.zeros(observations.measured.size)
+    for one in observations.slices:
+        on[one.first:one.last] = observations.pieces[one.piece].recording in chosen
+    return [replace(s, columns=s.columns * on[:, None]) for s in signatures]
 
 
 def described(observations: Observations, fit: Fit, nominal: Parameters, unnamed: Unnamed,
@@ -283,7 +337,7 @@ def described(observations: Observations, fit: Fit, nominal: Parameters, unnamed
     values = {p.name: min(max(values[p.name], p.lower), p.upper) for p in kind.parameters}
     size = max(abs(v) for v in description.knots)
     again = fit_structure(
-        observations, fit.structure.with_effect(replace(description.effect, late=False)), nominal,
+        observations, fit.structure.with_effect(description.effect, description.onset), nominal,
         unnamed.metric, {**fit.solution.values, **values},
         {**fit.parameters, **dict.fromkeys(KNOTS, size), 'range_low': values['range_low'],
          'range_high': values['range_high']}, STEPS)

@@ -16,6 +16,7 @@ from lg_husky_sim.diagnosis.unnamed import KNOTS, look_for_unnamed
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.problem import observations
 from lg_husky_sim.recording import Recording, segments
 import numpy as np
@@ -31,15 +32,23 @@ FORCE = Effect('smooth_force', shape='yaw')
 Record = Callable[..., Recording]
 
 
-def diagnosed(record: Record, effects: Mapping[Effect, Mapping[str, float]]) -> Case:
+def plant_with(effects: Mapping[Effect, Mapping[str, float]]) -> Plant:
     model = load_model()
     structure, parameters = model.structure, model.parameters
     for effect, values in effects.items():
         structure = structure.with_effect(effect)
         parameters = parameters.with_entries(*effect_entries(effect, values))
-    plant = compile_model(structure).at(parameters)
-    return diagnose([record('ahead', plant, STEPS, 1), record('back', plant, STEPS[::-1], 2)],
-                    model, lambda text, share: None)
+    return compile_model(structure).at(parameters)
+
+
+def driven(record: Record, plant: Plant, name: str, seed: int) -> list[Recording]:
+    return [record(f'{name}1', plant, STEPS, seed), record(f'{name}2', plant, STEPS[::-1],
+                                                           seed + 1)]
+
+
+def diagnosed(record: Record, effects: Mapping[Effect, Mapping[str, float]]) -> Case:
+    return diagnose(driven(record, plant_with(effects), 'rec', 1), load_model(),
+                    lambda text, share: None)
 
 
 def test_effort_without_a_name_is_described_and_modelled(record: Record) -> None:
@@ -51,6 +60,19 @@ def test_effort_without_a_name_is_described_and_modelled(record: Record) -> None
     assert [(e.id, e.shape) for e in found.model.structure.effects] == [('smooth_force', 'yaw')]
     for name in ('position_rmse_m', 'forward_rmse'):
         assert found.held_out_augmented[name] < 0.8 * found.held_out_plain[name], name
+
+
+def test_change_without_a_name_is_described_from_then_on(record: Record) -> None:
+    before, after = (driven(record, plant_with(effects), name, seed) for name, effects, seed in (
+        ('base', {}, 1), ('rec', {FORCE: AHEAD}, 3)))
+    found = diagnose(after, load_model(), lambda text, share: None, before).diagnosis
+    assert found.verdict is Verdict.UNKNOWN
+    (late,) = [e for e in found.model.structure.effects if e.id == 'smooth_force']
+    assert (late.shape, late.late) == ('yaw', True)
+    onset = found.model.structure.onset
+    assert onset is not None
+    assert (onset.recording, onset.earlier) == ('rec1', ('base1', 'base2'))
+    assert found.augmented['position_rmse_m'] < 0.7 * found.plain['position_rmse_m']
 
 
 def test_name_that_leaves_an_effort_elsewhere_is_a_guise(record: Record) -> None:
@@ -68,9 +90,7 @@ def test_name_that_leaves_an_effort_elsewhere_is_a_guise(record: Record) -> None
 def test_smooth_effort_moves_the_recalibration_along(record: Record) -> None:
     """Its share is counted with the nominal numbers refitted: they had stood in for it."""
     model = load_model()
-    plant = compile_model(model.structure.with_effect(FORCE)).at(
-        model.parameters.with_entries(*effect_entries(FORCE, AHEAD)))
-    data = observations(segments(record('ahead', plant, STEPS, 1)))
+    data = observations(segments(record('ahead', plant_with({FORCE: AHEAD}), STEPS, 1)))
     found = look_for_unnamed(data, recalibrate(data, model.structure, model.parameters))
     assert found.descriptions[0].effect == FORCE
     assert found.share > 0.3
