@@ -272,6 +272,9 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
         words = (f'Something is missing that is not in the catalogue. It is described best by '
                  f'{description_words(best)}, between {min(best.knots):.3g} and '
                  f'{max(best.knots):.3g} {kind.parameters[-1].unit}.')
+        if first.adopted:
+            words += (f' The nearest entry, {first.rivals[0].effect.id}, leaves too much to be '
+                      'its name.')
         gain = best.held_out
     else:
         effect = near.effect if near is not None else first.scores[0].signature.candidate.effect

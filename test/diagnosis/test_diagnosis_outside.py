@@ -10,7 +10,8 @@ from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.diagnose import Case, diagnose
 from lg_husky_sim.diagnosis.doubts import belief, is_guise
 from lg_husky_sim.diagnosis.fits import recalibrate
-from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.judge import _acting_side
+from lg_husky_sim.diagnosis.result import Estimate, Verdict
 from lg_husky_sim.diagnosis.rivals import adopts, Rival
 from lg_husky_sim.diagnosis.unnamed import KNOTS, look_for_unnamed
 from lg_husky_sim.husky.effects import Effect
@@ -118,3 +119,11 @@ def test_a_name_is_believed_less_the_more_it_leaves() -> None:
     assert belief(5000.0, 0.9, 0.0) > 0.99
     assert belief(5000.0, 0.9, 500.0) == pytest.approx(0.7, abs=0.01)
     assert belief(100.0, 0.1, 0.0) < 0.7
+
+
+@pytest.mark.parametrize(('effect', 'moment', 'side'), [
+    (Effect('yaw_pull'), 1.5, 'left'), (Effect('yaw_pull'), -1.5, 'right'),
+    (Effect('slope'), 1.5, 'none'), (Effect('coulomb_drivetrain', 'right'), 1.5, 'right')])
+def test_a_pull_says_to_which_side(effect: Effect, moment: float, side: str) -> None:
+    number = Estimate('pull_moment', moment, 'N·m', moment - 0.1, moment + 0.1)
+    assert _acting_side(effect, [number]) == side
