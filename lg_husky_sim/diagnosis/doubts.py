@@ -18,6 +18,7 @@ from lg_husky_sim.diagnosis.fits import Fit, shared_metric
 from lg_husky_sim.diagnosis.screening import Projector
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.unnamed import ridge, Unnamed
+from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -32,8 +33,10 @@ GUISE_WEIGHT, GUISE_HALF = 0.6, 0.1
 #: Part of what the named effects gained from which a further effect that was not adopted, or a
 #: smooth effort in another subsystem, says that the names are a guise; least such gain [nats].
 FURTHER_PART, SMOOTH_PART, LEAST_LEFT = 0.2, 0.4, 85.0
-#: The same for a smooth effort anywhere, and the share of what is left that it must explain then.
-ANYWHERE_PART, ANYWHERE_SHARE = 0.2, 0.2
+#: The same for a smooth effort anywhere.
+ANYWHERE_PART = 1.0
+#: Parts that all end in a torque on an axle.
+AXLE = {Subsystem.COMMAND, Subsystem.ELECTRICAL, Subsystem.DRIVETRAIN}
 #: The smooth effort that an effect is itself: where it explains more than any other, the element
 #: is right and only the shape of its law is not.
 OWN = {
@@ -76,6 +79,8 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
         return True
     effects = [r.rivals[0].effect for r in named]
     places = {effect.kind.subsystem for effect in effects}
+    if places & AXLE:
+        places |= AXLE
     own = {OWN[effect.id] for effect in effects if effect.id in OWN}
     mine = max((d.held_out for d in unnamed.descriptions
                 if (d.effect.id, d.effect.shape) in own), default=0.0)
@@ -83,8 +88,7 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
     elsewhere = [d for d in foreign if d.effect.kind.subsystem not in places]
     left = [(further_gain(search), FURTHER_PART)]
     left += [(d.held_out, SMOOTH_PART) for d in elsewhere[:1]]
-    if foreign and unnamed.share_of(foreign[0]) > ANYWHERE_SHARE:
-        left.append((foreign[0].held_out, ANYWHERE_PART))
+    left += [(d.held_out, ANYWHERE_PART) for d in foreign[:1]]
     return any(gain > max(LEAST_LEFT, part * gained) for gain, part in left)
 
 

@@ -31,6 +31,8 @@ CERTAIN, FOLLOWED = 45.0, 25.0
 EVIDENT, SMOOTH_SHARE = 85.0, 0.05
 #: The same for a change between recordings, where much else differs a little [nats].
 CERTAIN_CHANGE = 250.0
+#: The same of a smooth effort that begins with the later recordings [nats].
+SMOOTH_CHANGE = 1500.0
 #: The same before anything is refitted: signatures of the catalogue explain it then, and none of
 #: their refits does [nats].
 SCREENED_CHANGE = 500.0
@@ -181,7 +183,7 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     if search.change is not None:
         return screened > SCREENED_CHANGE or (
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]) or (
-            unnamed is not None and unnamed.held_out > CERTAIN_CHANGE
+            unnamed is not None and unnamed.held_out > SMOOTH_CHANGE
             and unnamed.share > CHANGE_SHARE[1])
     return tried > EVIDENT or (screened > CERTAIN and tried > FOLLOWED) or (
         unnamed is not None and unnamed.held_out > EVIDENT and unnamed.share > SMOOTH_SHARE)
