@@ -37,8 +37,9 @@ FURTHER_PART, SMOOTH_PART, LEAST_LEFT = 0.2, 0.4, 85.0
 ANYWHERE_PART = 1.0
 #: Parts that all end in a torque on an axle.
 AXLE = {Subsystem.COMMAND, Subsystem.ELECTRICAL, Subsystem.DRIVETRAIN}
-#: The smooth effort that an effect is itself: where it explains more than any other, the element
+#: The smooth effort that an effect is itself: where no other explains so much more, the element
 #: is right and only the shape of its law is not.
+CLEARLY = 1.25
 OWN = {
     'torque_ripple': ('smooth_torque', 'angle'), 'coulomb_drivetrain': (
         'smooth_torque', 'wheel_rate'), 'viscous_asymmetry': ('smooth_torque', 'wheel_rate'),
@@ -84,7 +85,7 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
     own = {OWN[effect.id] for effect in effects if effect.id in OWN}
     mine = max((d.held_out for d in unnamed.descriptions
                 if (d.effect.id, d.effect.shape) in own), default=0.0)
-    foreign = [d for d in unnamed.descriptions if d.held_out > mine]
+    foreign = [d for d in unnamed.descriptions if d.held_out > CLEARLY * mine]
     elsewhere = [d for d in foreign if d.effect.kind.subsystem not in places]
     left = [(further_gain(search), FURTHER_PART)]
     left += [(d.held_out, SMOOTH_PART) for d in elsewhere[:1]]
