@@ -163,7 +163,7 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
     plain_out, augmented_out = held_out_errors(
         found.plain, final, found.nominal, own, found.rounds[-1].metric)
     return Diagnosis(
-        verdict, judge.confidence(found, verdict), names,
+        verdict, judge.confidence(found, verdict, unnamed), names,
         judge.indistinguishable(found), listed,
         judge.recalibration(found, nominal.parameters),
         errors(plant_of(found.plain), own), errors(plant_of(final), own),

@@ -292,7 +292,7 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
                    words), best if described else None
 
 
-def confidence(search: Search, verdict: Verdict) -> float:
+def confidence(search: Search, verdict: Verdict, unnamed: Unnamed | None = None) -> float:
     """
     Return how sure the verdict and the first name are.
 
@@ -300,6 +300,8 @@ def confidence(search: Search, verdict: Verdict) -> float:
     ----------
     search : Search
     verdict : Verdict
+    unnamed : Unnamed, optional
+        What smooth descriptions explain: they speak for an unknown effect, too.
 
     Returns
     -------
@@ -311,6 +313,7 @@ def confidence(search: Search, verdict: Verdict) -> float:
     if verdict is Verdict.NOTHING_MISSING:
         return float(1.0 / (1.0 + np.exp((strongest - 20.0) / 6.0)))
     if verdict is Verdict.UNKNOWN:
+        strongest = max(strongest, 0.0 if unnamed is None else unnamed.held_out)
         return float(1.0 / (1.0 + np.exp(-(strongest - CERTAIN) / 15.0)) * 0.5 + 0.4)
     by_name: dict[str, float] = {}
     for rival in first.rivals:

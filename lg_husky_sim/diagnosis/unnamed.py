@@ -11,7 +11,7 @@ missing which is none of them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import itertools
 import math
@@ -268,20 +268,45 @@ def look_for_unnamed(observations: Observations, fit: Fit, change: Onset | None 
         return describe(observations, shown, projector, residual, jacobian, folds, FOLDS)
     ranked = ranking(signatures)
     if change is not None:
-        beyond = []
-        for one in [d for d in ranked[:FIRST] if d.held_out > LEAST]:
-            own = [s for s in whole if s.candidate.effect == one.effect]
-            placebo = sum(
-                max(ranking(switched(observations, own, change, earlier))[0].held_out, 0.0)
-                for earlier in observations.recordings[
-                    :observations.recordings.index(change.recording)])
-            always = ranking(own)[0].held_out
-            if one.held_out > max(PLACEBO * placebo, ALWAYS * always):
-                beyond.append(replace(one, effect=replace(one.effect, late=True), onset=change))
-        ranked = tuple(beyond)
+        ranked = beyond_placebo(observations, ranked, whole, change, ranking)
     left = (residual - jacobian @ projector.recalibrated(residual)) * metric.scale
     return Unnamed(ranked, float(np.sum(np.minimum(left ** 2, 1e6))),
                    int(np.count_nonzero(metric.scale)), metric)
+
+
+def beyond_placebo(observations: Observations, ranked: Sequence[Description],
+                   signatures: Sequence[Signature], change: Onset,
+                   ranking: Callable[[Sequence[Signature]], tuple[Description, ...]]
+                   ) -> tuple[Description, ...]:
+    """
+    Keep the first few descriptions that explain more since a change than if it were another one.
+
+    Parameters
+    ----------
+    observations : Observations
+    ranked : sequence of Description
+        Efforts that begin with the later recordings, best first.
+    signatures : sequence of Signature
+        The same efforts, on in all recordings.
+    change : Onset
+    ranking : callable
+        Ranks what some signatures describe.
+
+    Returns
+    -------
+    tuple of Description
+        Each with its onset.
+    """
+    earlier = observations.recordings[:observations.recordings.index(change.recording)]
+    beyond = []
+    for one in [d for d in ranked[:FIRST] if d.held_out > LEAST]:
+        own = [s for s in signatures if s.candidate.effect == one.effect]
+        placebo = sum(max(ranking(switched(observations, own, change, name))[0].held_out, 0.0)
+                      for name in earlier)
+        always = ranking(own)[0].held_out
+        if one.held_out > max(PLACEBO * placebo, ALWAYS * always):
+            beyond.append(replace(one, effect=replace(one.effect, late=True), onset=change))
+    return tuple(beyond)
 
 
 def switched(observations: Observations, signatures: Sequence[Signature], change: Onset,

@@ -21,7 +21,8 @@ A generator that shares no code with the diagnosis hides physics in a robot, dri
 and publishes rosbags. The answers are sealed: the SHA-256 of each salted answer is written down
 before the first diagnosis (all of them together: `{seal}`). Then
 `lg_husky diagnose --no-report` is called as any user would call it, with the recordings and
-nothing else. Robots used for tuning have seeds below 10000, those reported here {seeds}.
+nothing else. Robots used for tuning have seeds below 10000 or are those of earlier trials; those
+reported here have {seeds}.
 
 | world | what stands in for the real robot |
 | --- | --- |
