@@ -32,7 +32,7 @@ EVIDENT, SMOOTH_SHARE = 85.0, 0.05
 #: The same for a change between recordings, where much else differs a little [nats].
 CERTAIN_CHANGE = 250.0
 #: The same of a smooth effort that begins with the later recordings [nats].
-SMOOTH_CHANGE = 1500.0
+SMOOTH_CHANGE = 4000.0
 #: The same before anything is refitted: signatures of the catalogue explain it then, and none of
 #: their refits does [nats].
 SCREENED_CHANGE = 500.0

@@ -73,9 +73,9 @@ class Round:
     rest: float = 1.0
 
 
-def play_round(observations: Observations, base: Fit, nominal: Parameters,
+def play_round(observations: Observations, base: Fit, number: int, nominal: Parameters,
                pool: Sequence[Candidate], masks: Sequence[Onsets], folds: FloatArray,
-               number: int, only_late: bool = False, eager: bool = False,
+               only_late: bool = False, eager: bool = False,
                workers: Workers = HERE) -> Round:
     """
     Play one round of the search.
@@ -84,13 +84,13 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     ----------
     observations : Observations
     base : Fit
+    number : int
+        Effects that were adopted before.
     nominal : Parameters
     pool : sequence of Candidate
     masks : sequence of Onsets
         Onsets to try.
     folds : numpy.ndarray
-    number : int
-        Effects that were adopted before.
     only_late : bool
         Whether only effects with an onset are asked for: what changed between recordings.
     eager : bool
@@ -153,14 +153,14 @@ def play_round(observations: Observations, base: Fit, nominal: Parameters,
     best = min(usable, key=lambda pair: pair[1].solution.cost)[1]
     final = shared_metric(observations, best, [])
     usable = rescued(observations, base, nominal, usable, final, rebased, workers)
-    closest = min(usable, key=lambda pair: _left(observations, pair[1], final))[1]
+    closest = min(usable, key=lambda pair: left_by(observations, pair[1], final))[1]
     if closest is not best:
         final = shared_metric(observations, closest, [])
     cost_base = held_out_cost(observations, rebased, final, folds)
     rivals = []
     for score, fit in usable:
         cost = held_out_cost(observations, fit, final, folds)
-        gain = _left(observations, rebased, final) - _left(observations, fit, final)
+        gain = left_by(observations, rebased, final) - left_by(observations, fit, final)
         rivals.append(Rival(fit.structure.effects[-1], score.onset, fit, gain,
                             float(np.sum(cost_base - cost))))
     rivals.sort(key=lambda r: -rank(r))
@@ -183,7 +183,8 @@ def is_eased(fit: Fit) -> bool:
         fit.parameters[later] > fit.parameters[own] for own, later in effect.renamed.items())
 
 
-def _left(observations: Observations, fit: Fit, metric_: Metric) -> float:
+def left_by(observations: Observations, fit: Fit, metric_: Metric) -> float:
+    """Return half the sum of squares that a fit leaves, whitened by a metric [nats]."""
     white = metric_.whiten(observations, observations.measured - fit.solution.predicted)
     return 0.5 * float(white @ white)
 
@@ -214,8 +215,8 @@ def rescued(observations: Observations, base: Fit, nominal: Parameters,
     list of (Score, Fit)
         In the same order.
     """
-    without = _left(observations, rebased, metric_)
-    lost = [i for i, (_, fit) in enumerate(usable) if _left(
+    without = left_by(observations, rebased, metric_)
+    lost = [i for i, (_, fit) in enumerate(usable) if left_by(
         observations, fit, metric_) > without]
     lean = {i: without_columns(usable[i][0]) for i in lost}
     quick = workers.map(run_refit, [Refit(observations, base, nominal, lean[i], metric_, 3)

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from lg_husky_sim.diagnosis.candidates import candidates, changed_candidates
 from lg_husky_sim.diagnosis.evidence import folds_of
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate
 from lg_husky_sim.diagnosis.onset_placing import begun_late, refined_onset
 from lg_husky_sim.diagnosis.onsets import change_onsets, Onsets, place_onsets, time_onsets
-from lg_husky_sim.diagnosis.rivals import LEAST_GAIN
+from lg_husky_sim.diagnosis.revision import reconsidered, without_idle
 from lg_husky_sim.diagnosis.rounds import play_round, Round
 from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.husky.effects import Effect, Onset
@@ -32,8 +33,6 @@ import numpy as np
 
 #: Most effects that are named.
 MOST = 3
-#: Loss per value below which an earlier effect is dropped again [nats].
-IDLE = 0.002
 #: Part of a change's gain that the same number in all recordings may miss.
 ALIKE = 0.25
 
@@ -118,8 +117,9 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         if change is not None:
             masks = change_onsets(observations, change, base.structure.onset)
         progress(f'round {number + 1}: signatures and refits', number / (most + 1))
-        one = play_round(observations, base, nominal, pool, masks, folds, number - corrected,
-                         only_late=change is not None, eager=eager, workers=workers)
+        play = partial(play_round, observations, nominal=nominal, pool=pool, masks=masks,
+                       folds=folds, only_late=change is not None, eager=eager, workers=workers)
+        one = play(base, number=number - corrected)
         if one.adopted and change is not None and number < most:
             common = as_before(observations, base, one, nominal)
             if common is not None:
@@ -144,6 +144,9 @@ def search(observations: Observations, structure: Structure, nominal: Parameters
         base = without_idle(observations, base, nominal, one.metric, structure)
         kept = set(base.structure.effects)
         rounds = [r for r in rounds if not r.adopted or _same(r, kept)]
+        if len(rounds) > 1 and not eager:
+            progress(f'round {number + 1}: earlier names again', (number + 0.7) / (most + 1))
+            base, rounds = reconsidered(observations, base, rounds, nominal, play)
     return Search(observations, plain, base, tuple(rounds), nominal, change)
 
 
@@ -200,36 +203,6 @@ def as_before(observations: Observations, base: Fit, one: Round, nominal: Parame
 def _same(one: Round, kept: set[Effect]) -> bool:
     # Whether what a round adopted is still in.
     return one.rivals[0].effect in kept
-
-
-def without_idle(observations: Observations, fit: Fit, nominal: Parameters, metric_: Metric,
-                 first: Structure) -> Fit:
-    """
-    Return a fit without the effects that a later one has made needless.
-
-    Parameters
-    ----------
-    observations : Observations
-    fit : Fit
-    nominal : Parameters
-    metric_ : Metric
-    first : Structure
-        Of the model in doubt: its own effects stay.
-
-    Returns
-    -------
-    Fit
-    """
-    for effect in fit.structure.effects[len(first.effects):-1]:
-        left = tuple(e for e in fit.structure.effects if e != effect)
-        onset = fit.structure.onset if any(e.late for e in left) else None
-        sizes = {**fit.parameters, **fit.solution.values}
-        again = fit_structure(observations, replace(fit.structure, effects=left, onset=onset),
-                              nominal, metric_, fit.solution.values, sizes, 4)
-        if again is not None and again.solution.cost - fit.solution.cost < max(
-                LEAST_GAIN[0], IDLE * len(observations.measured)):
-            return again
-    return fit
 
 
 def with_better_onset(observations: Observations, fit: Fit, nominal: Parameters,

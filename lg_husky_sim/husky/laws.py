@@ -26,7 +26,7 @@ CEILING = WIDTH - 1
 #: Laws that act on a voltage of the driver.
 OF_THE_DRIVER = (7, 8, 9, 10, 11, 12)
 #: Length of the context vector: time, heading, x, y, angle_left, angle_right.
-CONTEXT = 6
+CONTEXT = 7
 #: Length of the memory vector: heat of both motors, play of both gears.
 MEMORY = 4
 
@@ -68,7 +68,8 @@ class Law(enum.IntEnum):
     HEATING = 13
     """f = -p0 heat z0, heat' = z0^2 - heat/p1; p2 is 0 (left) or 1 (right)."""
     BACKLASH = 14
-    """f = -p1 z2 while the play p0 is being crossed at the rate z0/p1 - z1; p2 is the side."""
+    """f = -p1 z2 for the part of a step in which the play p0 is being crossed, at the rate
+    z0/p1 - z1; p2 is the side."""
     TABLE = 15
     """f = table over [p1, p2] with |p3| knots p4..., of context p0 >= 0 or of z0 if p0 < 0;
     straight between the knots, and periodic where p3 is negative."""
@@ -132,7 +133,7 @@ def _table(coefficients: FloatArray, c: int, j: int, argument: float) -> float:
 
 @jit
 def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int,
-                memory: FloatArray, time: float, ceiling: float) -> float:
+                memory: FloatArray, time: float, step: float, ceiling: float) -> float:
     # Laws of the electrical side: what the driver adds to its own voltage.
     own: float = z[o]
     if ceiling > 0.0:
@@ -154,9 +155,12 @@ def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int
         return -own * min(p0 * max(time, 0.0), p1)
     if law == 13:
         return float(-p0 * memory[int(p2)] * own)
-    if abs(memory[2 + int(p2)]) < 0.5 * p0:
-        return float(-p1 * z[o + 2])
-    return 0.0
+    rate = z[o] / p1 - z[o + 1]
+    left = 0.5 * p0 - math.copysign(memory[2 + int(p2)], rate * memory[2 + int(p2)])
+    if left <= 0.0:
+        return 0.0
+    return float(-p1 * z[o + 2] * (1.0 if abs(rate) * step < left else left / (
+        abs(rate) * step)))
 
 
 @jit
@@ -211,7 +215,7 @@ def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatA
             selector = int(p0)
             out[j] = _table(coefficients, c, j, z[o] if selector < 0 else context[selector])
         else:
-            out[j] = _source_law(law, p0, p1, p2, z, o, memory, context[0],
+            out[j] = _source_law(law, p0, p1, p2, z, o, memory, context[0], context[6],
                                  coefficients[c, j, CEILING])
 
 

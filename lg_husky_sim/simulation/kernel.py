@@ -165,7 +165,8 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
     z = np.zeros(h.shape[2])
     f0 = np.zeros(efforts)
     f1 = np.zeros(efforts)
-    context = np.zeros(6)
+    context = np.zeros(7)
+    context[6] = period / substeps
     start = np.zeros(n4)
     end = np.zeros(n4)
     inside = np.zeros(nodes.shape[2])
@@ -188,6 +189,7 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
             u[0] = max(-clamp, min(clamp, u[0]))
             u[1] = max(-clamp, min(clamp, u[1]))
         play_left, play_right = memory[2], memory[3]
+        angle_left, angle_right = s[n], s[n + 1]
         for _ in range(substeps):
             for i in range(n4):
                 start[i] = s[i]
@@ -245,8 +247,10 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
         for i in range(6):
             out[step, 7 + i] = s[n + i]
         # Encoders turn with the motors, which run ahead of the wheels within the gears' play.
-        out[step, 0] += (memory[2] - play_left) / period
-        out[step, 1] += (memory[3] - play_right) / period
+        if memory[2] != play_left:
+            out[step, 0] = (s[n] - angle_left + memory[2] - play_left) / period
+        if memory[3] != play_right:
+            out[step, 1] = (s[n + 1] - angle_right + memory[3] - play_right) / period
         out[step, 7] += memory[2]
         out[step, 8] += memory[3]
         out[step, 13] = row[7]

@@ -61,9 +61,11 @@ def test_expression_and_opcode_agree(law: Law) -> None:
         z = generator.normal(scale=2.0, size=ARGUMENTS.get(law, 1))
         context = np.abs(generator.normal(scale=3.0, size=CONTEXT))
         memory = generator.uniform(-1.0, 1.0, MEMORY)
+        rate = z[0] / p[1] - z[1] if law == Law.BACKLASH else 1.0
+        left = 0.5 * p[0] - math.copysign(1.0, rate) * memory[2 + side]
         signals = {'time': context[0], 'heading': context[1], 'angle': context[4 + side],
                    'heat': memory[side],
-                   'in_play': float(abs(memory[2 + side]) < 0.5 * p[0])}
+                   'in_play': max(0.0, min(1.0, left / (abs(rate) * context[6])))}
         got = opcode(law, p, z, context, memory, before=int(generator.integers(3)))
         assert got == pytest.approx(expression(law, p, z, **signals), rel=1e-12, abs=1e-13)
         values.append(got)
@@ -169,14 +171,17 @@ def test_heat_comes_to_its_balance(side: int) -> None:
 @pytest.mark.parametrize('side', [0, 1])
 def test_play_is_crossed_and_then_ends(side: int) -> None:
     """The motor runs ahead of the wheel by 1 rad/s across 0.2 rad of play, from its middle."""
-    memory, transmission = np.zeros(MEMORY), 3.5
-    p, z = [0.2, transmission, side], [transmission * 3.0, 2.0, 5.0]
+    memory, transmission, context = np.zeros(MEMORY), 3.5, np.zeros(CONTEXT)
+    context[6] = 0.01
+    p, z = [0.195, transmission, side], [transmission * 3.0, 2.0, 5.0]
     torques = []
     for _ in range(20):
-        torques.append(opcode(Law.BACKLASH, np.array(p), np.array(z), None, memory))
+        torques.append(opcode(Law.BACKLASH, np.array(p), np.array(z), context, memory))
         memory = advanced(Law.BACKLASH, p, z, memory, 0.01)
-    assert memory[2 + side] == pytest.approx(0.1)
+    assert memory[2 + side] == pytest.approx(0.0975)
     assert memory[3 - side] == 0.0
     # No torque reaches the wheel (the effort takes T i away) until half the play is crossed.
+    # The step in which it ends lets a part of it through.
     assert torques[:9] == [-transmission * 5.0] * 9
-    assert torques[11:] == [0.0] * 9
+    assert torques[9] == pytest.approx(-transmission * 5.0 * 0.75)
+    assert torques[10:] == [0.0] * 10
