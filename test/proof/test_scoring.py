@@ -211,7 +211,7 @@ def test_text_and_page_say_the_figures() -> None:
         'seal': 'cd' * 32, 'first_seed': 11_000, 'last_seed': 11_008}]})
     assert '    lg_husky prove --seed 10000\n    lg_husky prove --seed 11000\n' in page
     assert f'`{"ab" * 8}` and `{"cd" * 8}`' in page
-    assert 'reported here 10000 to 10003 and 11000 to 11008.' in page
+    assert 'reported here have 10000 to 10003 and 11000 to 11008.' in page
     assert 'The first 4 of 4 and the first 2 of 9 cases to finish' in page
 
 
