@@ -251,18 +251,18 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
     if correction is not None:
         forward, yaw, left, right = (float(c) for c in np.add(piece.began, correction))
         twist, rates = BodyTwist(forward, yaw), (left, right)
-    state = simulator.initial(_pose_at(piece.pose, piece.start), twist, piece.start, rates,
-                              piece.wheel_angles)
+    stride = max(1, round(RESET / PERIOD)) if piece.pose is not None else piece.count or 1
+    poses = _poses(piece, stride)
+    state = simulator.initial(poses[0], twist, piece.start, rates, piece.wheel_angles)
     flat = np.array(state.flat)
     if len(commands) and commands.times[0] <= piece.start + PERIOD:
         _fill_command(flat, state.n, held)
     out = np.empty((piece.count + 1, len(COLUMNS)))
     out[0] = state.row
-    stride = max(1, round(RESET / PERIOD)) if piece.pose is not None else piece.count or 1
     for first in range(0, piece.count, stride):
         last = min(first + stride, piece.count)
         if piece.pose is not None and first:
-            now = _pose_at(piece.pose, piece.start + first * PERIOD)
+            now = poses[first // stride]
             flat[state.n + 3:state.n + 6] = now.heading, now.x, now.y
         run(flat, held[first:last], out[first + 1:last + 1],
             *simulator.operators.arguments)  # type: ignore[arg-type]
@@ -286,10 +286,14 @@ def _fill_command(flat: FloatArray, n: int, held: FloatArray) -> None:
     flat[base + 3 + DELAY:] = held[0, 1]
 
 
-def _pose_at(pose: TimeSeries | None, time: float) -> Pose:
-    if pose is None:
-        return Pose()
-    return Pose(*(float(np.interp(time, pose.times, pose.values[:, i])) for i in range(3)))
+@lru_cache(maxsize=256)
+def _poses(piece: Piece, stride: int) -> tuple[Pose, ...]:
+    # Measured poses at the start and at each reset.
+    if piece.pose is None:
+        return (Pose(),)
+    times = piece.start + np.arange(0, max(piece.count, 1), stride) * PERIOD
+    columns = [np.interp(times, piece.pose.times, piece.pose.values[:, i]) for i in range(3)]
+    return tuple(Pose(*row) for row in np.column_stack(columns).tolist())
 
 
 def _sample(column: FloatArray, start: float, times: FloatArray) -> FloatArray:
