@@ -175,8 +175,10 @@ def rivals_figure(case: Case) -> Figure | None:
             axes.set_axis_off()
         for axes, (number, one) in zip(grid, enumerate(rounds), strict=False):
             _draw_round(axes, one)
+            named = 'adopted' if case.diagnosis.verdict is Verdict.KNOWN else (
+                'nearest, but not its name')
             axes.set_title(f'Round {number + 1}: '
-                           + ('adopted' if one.adopted else 'nothing adopted'))
+                           + (named if one.adopted else 'nothing adopted'))
     return figure
 
 

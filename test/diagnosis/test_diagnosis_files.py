@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 import html
 import json
 from pathlib import Path
@@ -13,9 +14,10 @@ from typing import Any
 
 from lg_husky_sim.cli.main import run
 from lg_husky_sim.diagnosis.diagnose import Case
-from lg_husky_sim.diagnosis.figures import channel_rows, new_elements
+from lg_husky_sim.diagnosis.figures import channel_rows, new_elements, rivals_figure
 from lg_husky_sim.diagnosis.output import write_files
 from lg_husky_sim.diagnosis.report import new_terms
+from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.husky.effects import catalogue
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import read_recording, Recording, write_recording
@@ -141,6 +143,16 @@ def test_new_element_stands_in_graph_and_equations(diagnosed: Callable[[str], Ca
     assert law.startswith('F_yaw_scrub_coulomb = -(yaw_coulomb_moment)*')
     factor = float(re.findall(r'\+([\d.]+) · F_yaw', equation)[0])
     assert factor == pytest.approx(1.0 / case.diagnosis.model.parameters['yaw_inertia'], rel=1e-3)
+
+
+def test_a_guise_is_not_shown_as_adopted(diagnosed: Callable[[str], Case]) -> None:
+    """Where the verdict is unknown, the entry that came nearest has not been adopted."""
+    case = diagnosed('rotation')
+    for verdict, words in ((Verdict.KNOWN, 'Round 1: adopted'),
+                           (Verdict.UNKNOWN, 'Round 1: nearest, but not its name')):
+        figure = rivals_figure(replace(case, diagnosis=replace(case.diagnosis, verdict=verdict)))
+        assert figure is not None
+        assert figure.axes[0].get_title(loc='left') == words
 
 
 def test_change_of_a_channel_lies_in_its_interval(diagnosed: Callable[[str], Case]) -> None:
