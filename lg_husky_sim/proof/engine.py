@@ -111,6 +111,26 @@ def _step_forces(p: Vector, forward: float, yaw: float, heading: float, position
     return ahead, floor[3], moment
 
 
+def _bus(p: Vector, time: float, duties: list[float], back: list[float]) -> float:
+    """
+    Return the voltage of a bus that its motors load, in the same step [V].
+
+    With the current of the step before, a source that resists more than the windings would swing
+    up from step to step.
+    """
+    emf = p[w.EMF] * (1.0 - p[w.DROOP_DEPTH] * (1.0 - math.exp(-time / p[w.DROOP_TIME])))
+    source = p[w.BATTERY_RESISTANCE] + p[w.POLARISATION]
+    share = source / p[w.RESISTANCE]
+    bus = (emf + share * sum(d * b for d, b in zip(duties, back, strict=True))) / (
+        1.0 + share * sum(d * d for d in duties))
+    limit = p[w.CURRENT_LIMIT]
+    if limit > 0.0:
+        bus = emf - source * sum(
+            d * min(max((d * bus - b) / p[w.RESISTANCE], -limit), limit)
+            for d, b in zip(duties, back, strict=True))
+    return float(bus)
+
+
 def integrate_engine(off: Vector, on: Vector, gate: Gate, demand: Vector, rough: Vector,
                      pose: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Vector:
     """
@@ -170,9 +190,7 @@ def integrate_engine(off: Vector, on: Vector, gate: Gate, demand: Vector, rough:
         duties = [chopper(float(volts), p) for volts in volts_asked[row]]
         wheel = [float(data.qvel[k]) for k in rates]
         currents = [float(torque) / p[w.TORQUE_CONSTANT] for torque in data.actuator_force]
-        drawn = duties[0] * currents[0] + duties[1] * currents[1]
-        bus = p[w.EMF] * (1.0 - p[w.DROOP_DEPTH] * (1.0 - math.exp(-time / p[w.DROOP_TIME])))
-        bus -= (p[w.BATTERY_RESISTANCE] + p[w.POLARISATION]) * drawn
+        bus = _bus(p, time, duties, [p[w.TORQUE_CONSTANT] * rate for rate in wheel])
         for side in range(2):
             volts = duties[side] * bus
             back = p[w.TORQUE_CONSTANT] * wheel[side]
@@ -193,7 +211,8 @@ def integrate_engine(off: Vector, on: Vector, gate: Gate, demand: Vector, rough:
             float(push[0] * cosine + push[1] * sine),
             float(-push[0] * sine + push[1] * cosine), bus,
             float(data.ctrl[0]), float(data.ctrl[1]))
-    if not np.isfinite(table).all():
+    speeds = np.abs(table[:, [1, 7, 8]])
+    if not np.isfinite(table).all() or np.any(speeds > (50.0, 500.0, 500.0)):
         raise FloatingPointError('the robot in the engine left its bounds')
     return table
 

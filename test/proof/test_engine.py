@@ -55,6 +55,19 @@ def test_a_change_of_the_robot_is_felt(changes: dict[str, float], channel: str,
     assert np.abs(changed[channel] - plain[channel]).max() > least
 
 
+def test_a_source_that_resists_more_than_the_windings_is_stable() -> None:
+    """The bus is what the battery leaves of its EMF under the currents that the bus drives."""
+    resistance = 2.0 * world.nominal()['resistance']
+    plain = motion(20.0, 20.0)
+    weak = motion(20.0, 20.0, {'battery_resistance': resistance})
+    assert 0.1 < weak['forward'].max() < plain['forward'].max()
+    assert np.count_nonzero(np.abs(np.diff(weak['bus'])) > 1.0) < 10
+    late = slice(400, None)
+    drawn = 20.0 / 24.0 * (weak['current_left'] + weak['current_right'])[late]
+    left = weak['bus'][late] + resistance * drawn
+    assert left == pytest.approx(np.full(left.shape, left[-1]), rel=0.02)
+
+
 def test_less_adhesion_at_a_place_only_shows_there() -> None:
     plain = motion(4.0, 14.0)
     icy = motion(4.0, 14.0, {'tyre_friction': 0.15}, Gate('place', 0.5))
