@@ -25,7 +25,7 @@ WIDTH = 24
 CEILING = WIDTH - 1
 #: Laws that act on a voltage of the driver.
 OF_THE_DRIVER = (7, 8, 9, 10, 11, 12)
-#: Length of the context vector: time, heading, x, y, angle_left, angle_right.
+#: Length of the context vector: time, heading, x, y, angle_left, angle_right, sub-step.
 CONTEXT = 7
 #: Length of the memory vector: heat of both motors, play of both gears.
 MEMORY = 4
@@ -156,7 +156,7 @@ def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int
     if law == 13:
         return float(-p0 * memory[int(p2)] * own)
     rate = z[o] / p1 - z[o + 1]
-    left = 0.5 * p0 - math.copysign(memory[2 + int(p2)], rate * memory[2 + int(p2)])
+    left = 0.5 * p0 - math.copysign(1.0, rate) * memory[2 + int(p2)]
     if left <= 0.0:
         return 0.0
     return float(-p1 * z[o + 2] * (1.0 if abs(rate) * step < left else left / (

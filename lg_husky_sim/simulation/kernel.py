@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 
-from lg_husky_sim.husky.laws import evaluate, remember
+from lg_husky_sim.husky.laws import CONTEXT, evaluate, remember
 from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -165,7 +165,7 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
     z = np.zeros(h.shape[2])
     f0 = np.zeros(efforts)
     f1 = np.zeros(efforts)
-    context = np.zeros(7)
+    context = np.zeros(CONTEXT)
     context[6] = period / substeps
     start = np.zeros(n4)
     end = np.zeros(n4)

@@ -73,6 +73,12 @@ def record() -> Callable[..., Recording]:
 
 
 @pytest.fixture(scope='session')
+def steps() -> Sequence[tuple[float, float, float]]:
+    """Return the steps of the drives: duration [s], forward speed [m/s] and yaw rate [rad/s]."""
+    return STEPS
+
+
+@pytest.fixture(scope='session')
 def drive() -> Callable[..., Recording]:
     """Return the function that makes a drive."""
     return driven

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 
 from lg_husky_sim.diagnosis.candidates import candidates, effect_entries
@@ -19,15 +19,13 @@ from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.recording import Recording, segments
 import pytest
 
-STEPS = ((1.0, 0.0, 0.0), (2.0, 0.4, 0.0), (2.0, 0.8, 0.0), (2.0, 0.5, 0.6), (2.0, 0.0, 0.6),
-         (2.0, -0.5, 0.0), (2.0, -0.6, -0.5), (2.0, 0.0, -0.9), (2.0, 0.7, -0.4),
-         (2.0, 0.0, 0.0))
+Steps = Sequence[tuple[float, float, float]]
 LATE = (Effect('command_latency'), {'latency': 0.06})
 WRONG = (Effect('gyro_scale'), {'gyro_factor': 0.7})
 
 
 @pytest.fixture(scope='module')
-def data(record: Callable[..., Recording]) -> Observations:
+def data(record: Callable[..., Recording], steps: Steps) -> Observations:
     """Return two drives of a robot that acts late and whose gyro reads too little."""
     model = load_model()
     structure, parameters = model.structure, model.parameters
@@ -35,8 +33,8 @@ def data(record: Callable[..., Recording]) -> Observations:
         structure = structure.with_effect(effect)
         parameters = parameters.with_entries(*effect_entries(effect, values))
     plant = compile_model(structure).at(parameters)
-    return observations([s for seed, steps in ((1, STEPS), (2, STEPS[::-1]))
-                         for s in segments(record(f'rec{seed}', plant, steps, seed))])
+    return observations([s for seed, way in ((1, steps), (2, steps[::-1]))
+                         for s in segments(record(f'rec{seed}', plant, way, seed))])
 
 
 def adopted(data: Observations, base: Fit, number: int, only: Collection[str]) -> Round:

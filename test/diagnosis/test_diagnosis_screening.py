@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from lg_husky_sim.diagnosis.candidates import candidates, effect_entries
 from lg_husky_sim.diagnosis.fits import recalibrate, shared_metric
@@ -17,20 +17,17 @@ from lg_husky_sim.identification.problem import observations
 from lg_husky_sim.recording import Recording, segments
 import pytest
 
-STEPS = ((1.0, 0.0, 0.0), (2.0, 0.4, 0.0), (2.0, 0.8, 0.0), (2.0, 0.5, 0.6), (2.0, 0.0, 0.6),
-         (2.0, -0.5, 0.0), (2.0, -0.6, -0.5), (2.0, 0.0, -0.9), (2.0, 0.7, -0.4),
-         (2.0, 0.0, 0.0))
-
 
 @pytest.mark.parametrize(('effect', 'values'), [
     ('current_limit', {'current_limit': 1.0}), ('voltage_saturation', {'clip_voltage': 6.0})])
 def test_a_limit_is_screened_first_however_low_it_is(
-        effect: str, values: dict[str, float], record: Callable[..., Recording]) -> None:
+        effect: str, values: dict[str, float], record: Callable[..., Recording],
+        steps: Sequence[tuple[float, float, float]]) -> None:
     """A limit of a few per cent of the largest current has its own signature."""
     model = load_model()
     plant = compile_model(model.structure.with_effect(Effect(effect))).at(
         model.parameters.with_entries(*effect_entries(Effect(effect), values)))
-    data = observations(segments(record('rec', plant, STEPS, 1)))
+    data = observations(segments(record('rec', plant, steps, 1)))
     base = recalibrate(data, model.structure, model.parameters)
     signatures = [s for c in candidates() for s in look(Looked(c, base, data))]
     used = shared_metric(data, base, signatures)

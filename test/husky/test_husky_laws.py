@@ -170,7 +170,7 @@ def test_heat_comes_to_its_balance(side: int) -> None:
 
 @pytest.mark.parametrize('side', [0, 1])
 def test_play_is_crossed_and_then_ends(side: int) -> None:
-    """The motor runs ahead of the wheel by 1 rad/s across 0.2 rad of play, from its middle."""
+    """The motor runs ahead of the wheel by 1 rad/s across 0.195 rad of play, from its middle."""
     memory, transmission, context = np.zeros(MEMORY), 3.5, np.zeros(CONTEXT)
     context[6] = 0.01
     p, z = [0.195, transmission, side], [transmission * 3.0, 2.0, 5.0]
