@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 import hashlib
 import math
@@ -14,22 +14,28 @@ from typing import Any
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.proof import catalogue, effects, manoeuvres, robots, sensors, world
 from lg_husky_sim.proof.bags import write_bag
-from lg_husky_sim.proof.engine import integrate_engine
-from lg_husky_sim.proof.hidden import Setting
-from lg_husky_sim.proof.integrate import COLUMNS, Gate, integrate, ROUGH_PERIOD
+from lg_husky_sim.proof.hidden import Change, Setting
+from lg_husky_sim.proof.integrate import COLUMNS, Gate, integrate
+from lg_husky_sim.proof.motion import (
+    demand_of,
+    gates,
+    Hidden,
+    LEAST_TRACE,
+    Pose,
+    run,
+    visibility,
+)
 from lg_husky_sim.proof.sealing import seal
 import numpy as np
-from numpy.typing import NDArray
-
-Vector = NDArray[np.float64]
-Pose = tuple[float, float, float]
 
 KINDS = ('clean', 'single', 'pair', 'outside')
 WORLDS = ('g1', 'g2', 'g3')
-# Channel noise by which differences are made comparable: rad/s, rad/s, m/s.
 _ROBOTS = {'g1': robots.open_loop_robot, 'g2': robots.engine_robot,
            'g3': robots.closed_loop_robot}
-_SCALES = {'wheel_left': 0.05, 'wheel_right': 0.05, 'yaw_rate': 0.01, 'forward': 0.02}
+
+
+class NoTraceError(Exception):
+    """The drives that were drawn cannot show the effect that they should."""
 
 
 @dataclass(frozen=True)
@@ -73,22 +79,6 @@ class Spec:
                 ('onset', self.onset, ('', 'none', 'time', 'place'))):
             if value not in allowed:
                 raise CommandError(f'{name} = {value!r} is none of {", ".join(allowed)}')
-
-
-@dataclass(frozen=True)
-class Hidden:
-    """A robot with and without its effects, and when they hold."""
-
-    robot: robots.Robot
-    fields: dict[str, float]
-    command: sensors.CommandPath
-    senses: sensors.Senses
-    gusts: float
-    world: str = 'g1'
-    onset: str = 'none'
-    onset_recording: int = 0
-    onset_time: float = 0.0
-    onset_x: float = 0.0
 
 
 def _others(first: str, names: list[str]) -> list[str]:
@@ -156,38 +146,29 @@ def _setting(robot: robots.Robot, fields: Mapping[str, float],
 def _load(robot: robots.Robot, drive: manoeuvres.Manoeuvre) -> tuple[float, float]:
     """Return the integral of i² [A²·s] and the largest |i| [A] without any effect."""
     vector = world.vector(robot.fields)
-    table = integrate(vector, vector, Gate(), _demand(robot.fields, robot.command, drive, None),
+    table = integrate(vector, vector, Gate(), demand_of(robot.fields, robot.command, drive, None),
                       np.zeros((2, 5)))
     currents = table[:, COLUMNS.index('current_left'):COLUMNS.index('current_right') + 1]
     period = float(table[1, 0] - table[0, 0])
     return float((currents ** 2).sum(axis=0).max() * period), float(np.abs(currents).max())
 
 
-def _demand(fields: Mapping[str, float], path: sensors.CommandPath,
-            drive: manoeuvres.Manoeuvre, rng: np.random.Generator | None) -> Vector:
-    commands = sensors.received(drive, path, rng)
-    return sensors.demanded(commands, path, fields['loop'] > 0.5, 0.1651,
-                            2.0 * fields['half_track'])
-
-
 def conceal(spec: Spec, robot: robots.Robot, drives: tuple[manoeuvres.Manoeuvre, ...],
-            rng: np.random.Generator) -> tuple[Hidden, list[dict[str, Any]]]:
-    """Return the robot with its hidden effects, and what the answer says of them."""
+            rng: np.random.Generator) -> tuple[Hidden, list[dict[str, Any]], list[Change]]:
+    """Return the robot with its hidden effects, what the answer says of them, and each alone."""
     names, severities = choose(spec, rng)
     fields = dict(robot.fields)
     command: dict[str, Any] = {}
     senses: dict[str, Any] = {}
     wind = 0.0
-    told = []
+    told, changes = [], []
     for name, severity in zip(names, severities, strict=True):
         level = catalogue.SEVERITIES.index(severity)
         setting = _setting(robot, fields, drives, level, heavy=spec.world != 'g1')
         change = effects.build(name, setting, rng)
+        changes.append(change)
         fields.update(change.fields)
-        if fields['loop'] < 0.5 or robot.fields['loop'] > 0.5:
-            command.update(_added(robot.command, change.command))
-        else:
-            command.update(change.command)
+        command.update(_commanded(robot, fields, change))
         senses.update(change.senses)
         wind += change.gusts
         told.append({'effect': name, 'severity': severity, 'side': change.side,
@@ -202,7 +183,44 @@ def conceal(spec: Spec, robot: robots.Robot, drives: tuple[manoeuvres.Manoeuvre,
         senses['since'] = time
     hidden = Hidden(robot, fields, replace(robot.command, **command),
                     replace(robot.senses, **senses), wind, spec.world, onset, which, time)
-    return hidden, told
+    return hidden, told, changes
+
+
+def _commanded(robot: robots.Robot, fields: Mapping[str, float],
+               change: Change) -> Mapping[str, Any]:
+    if fields['loop'] < 0.5 or robot.fields['loop'] > 0.5:
+        return _added(robot.command, change.command)
+    return change.command
+
+
+def alone(hidden: Hidden, change: Change) -> Hidden:
+    """Return the same robot with one of its effects only."""
+    robot = hidden.robot
+    fields = {**robot.fields, **change.fields}
+    command: dict[str, Any] = {
+        'since': hidden.command.since, **_commanded(robot, fields, change)}
+    return replace(hidden, fields=fields, command=replace(robot.command, **command),
+                   senses=replace(robot.senses, **change.senses), gusts=change.gusts)
+
+
+def check_traces(hidden: Hidden, changes: Sequence[Change],
+                 drives: tuple[manoeuvres.Manoeuvre, ...], poses: list[Pose]) -> None:
+    """
+    Refuse an effect that these drives cannot show: a weak reverse gear when none reverses.
+
+    Raises
+    ------
+    NoTraceError
+        An effect alone moves no channel by `LEAST_TRACE` of its noise; faults of sensors
+        and wind show without any motion.
+
+    """
+    for change in changes:
+        if change.senses or change.gusts > 0.0:
+            continue
+        seen = visibility(alone(hidden, change), drives, poses)
+        if max(seen.values()) < LEAST_TRACE:
+            raise NoTraceError(f'{dict(change.parameters)} leaves no trace: {seen}')
 
 
 def _added(path: sensors.CommandPath, change: Mapping[str, float]) -> dict[str, float]:
@@ -216,47 +234,6 @@ def _added(path: sensors.CommandPath, change: Mapping[str, float]) -> dict[str, 
         if name in result and before > 0.0:
             result[name] = min(result[name], before) if result[name] > 0.0 else before
     return result
-
-
-def _gates(hidden: Hidden, index: int | None) -> tuple[Gate, float]:
-    """Return the gate and the `since` of recording `index` (None: held out)."""
-    if hidden.onset == 'place':
-        return Gate('place', hidden.onset_x, 0.3), -1.0
-    if hidden.onset == 'time' and index is not None:
-        if index < hidden.onset_recording:
-            return Gate('time', math.inf), math.inf
-        if index == hidden.onset_recording:
-            return Gate('time', hidden.onset_time), hidden.onset_time
-    return Gate(), -1.0
-
-
-def run(hidden: Hidden, drive: manoeuvres.Manoeuvre, pose: Pose, index: int | None,
-        rng: np.random.Generator | None, with_effect: bool = True) -> Vector:
-    """
-    Return the motion of one manoeuvre (`integrate`).
-
-    Without `rng` there is no roughness, no lost command and no wind: the best that any
-    model could know.
-    """
-    gate, since = _gates(hidden, index)
-    move = integrate_engine if hidden.world == 'g2' else integrate
-    robot = hidden.robot
-    fields = hidden.fields if with_effect else robot.fields
-    path = replace(hidden.command, since=since, own=robot.command.limits) if with_effect \
-        else robot.command
-    off, on = world.vector(robot.fields), world.vector(fields)
-    demand = _demand(fields, path, drive, rng)
-    rough = np.zeros((2, 5))
-    if rng is not None:
-        rough = robots.roughness(robot.floor, drive, rng)
-        if with_effect and hidden.gusts > 0.0:
-            still = move(off, on, gate, demand, rough, pose)
-            headings = np.interp(np.arange(rough.shape[0]) * ROUGH_PERIOD, still[:, 0],
-                                 still[:, COLUMNS.index('heading')])
-            rough = rough + robots.gusts(hidden.gusts, headings, rng)
-    if with_effect and gate.kind == 'time' and math.isinf(gate.at):
-        return move(off, off, Gate(), demand, rough, pose)
-    return move(off, on, gate, demand, rough, pose)
 
 
 def _gaps(senses: sensors.Senses, duration: float,
@@ -284,21 +261,6 @@ def _place(hidden: Hidden, drives: tuple[manoeuvres.Manoeuvre, ...],
     return replace(hidden, onset_x=float(np.quantile(passed, 0.5)))
 
 
-def visibility(hidden: Hidden, drives: tuple[manoeuvres.Manoeuvre, ...],
-               poses: list[Pose]) -> dict[str, float]:
-    """Return by how many noise levels the effect moves each channel, without any refit."""
-    squares = dict.fromkeys(_SCALES, 0.0)
-    rows = 0
-    for index, (drive, pose) in enumerate(zip(drives, poses, strict=True)):
-        with_it = run(hidden, drive, pose, index, None)
-        without = run(hidden, drive, pose, index, None, with_effect=False)
-        rows += with_it.shape[0]
-        for name, scale in _SCALES.items():
-            k = COLUMNS.index(name)
-            squares[name] += float((((with_it[:, k] - without[:, k]) / scale) ** 2).sum())
-    return {name: math.sqrt(value / rows) for name, value in squares.items()}
-
-
 def generate(spec: Spec, name: str, out_dir: Path, answers_dir: Path,
              held_out_dir: Path) -> str:
     """
@@ -319,20 +281,28 @@ def generate(spec: Spec, name: str, out_dir: Path, answers_dir: Path,
         Gets `<name>/held1`, ... (fresh recordings of the same robot) and `<name>/truth1`,
         ... (what the hidden robot would do without noise under the same commands).
 
+    Raises
+    ------
+    NoTraceError
+        The drives that were drawn cannot show the effect.
+    FloatingPointError
+        The robot leaves its physical bounds.
+
     """
     rng = np.random.default_rng([spec.seed, WORLDS.index(spec.world),
                                  KINDS.index(spec.kind)])
     robot = _ROBOTS[spec.world](rng)
     drives = manoeuvres.drive(spec.drive, rng)
-    hidden, told = conceal(spec, robot, drives, rng)
+    hidden, told, changes = conceal(spec, robot, drives, rng)
     elsewhere = bool(rng.random() < 0.5)
     poses = [_start_pose(rng, elsewhere) for _ in drives]
     if hidden.onset == 'place':
         hidden = _place(hidden, drives, poses)
+    check_traces(hidden, changes, drives, poses)
     clock = 1_760_000_000 + spec.seed % 100_000 * 600
     for index, (drive, pose) in enumerate(zip(drives, poses, strict=True)):
         table = run(hidden, drive, pose, index, rng)
-        senses = _gaps(replace(hidden.senses, since=_gates(hidden, index)[1]),
+        senses = _gaps(replace(hidden.senses, since=gates(hidden, index)[1]),
                        drive.duration, rng)
         write_bag(out_dir / name / 'recordings' / f'rec{index + 1}',
                   sensors.publish(table, drive, senses, rng), clock * 10 ** 9)

@@ -32,7 +32,9 @@ reported here have {seeds}.
 
 No two robots are alike: damping and scrub differ by up to 30 %, the voltage gain by 3 %, mass and
 inertia by 5 to 10 %, every floor is rough, encoders count ticks, stamps jitter, commands get
-lost or come a few milliseconds late, poses have gaps, gyros a small bias.
+lost or come a few milliseconds late, poses have gaps, gyros a small bias. Where the drives that
+were drawn cannot show an effect (a weak reverse gear, and nothing goes backwards: it moves no
+channel by 0.03 of its noise), another robot with another effect is drawn.
 """
 
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from lg_husky_sim.errors import CommandError, LgHuskyError
 from lg_husky_sim.proof import bags, measures, plain
-from lg_husky_sim.proof.cases import generate, Spec
+from lg_husky_sim.proof.cases import generate, NoTraceError, Spec
 from lg_husky_sim.proof.scoring import judge, Judgement
 from lg_husky_sim.proof.sealing import unseal, write_json
 
@@ -93,11 +93,15 @@ def _generate(spec: Spec, name: str, folders: Folders) -> tuple[str, str]:
         try:
             return name, generate(replace(spec, seed=spec.seed + again * REDRAWN), name,
                                   folders.cases, folders.answers, folders.held_out)
-        except FloatingPointError:
-            # This draw drives the robot out of its bounds: take the next, the same for everyone.
+        except (FloatingPointError, NoTraceError) as error:
+            # This draw drives the robot out of its bounds, or its drives cannot show the effect:
+            # take the next, the same for everyone; another effect where none can be seen.
+            if isinstance(error, NoTraceError):
+                spec = replace(spec, effects=())
             for place in (folders.cases, folders.held_out):
                 shutil.rmtree(place / name, ignore_errors=True)
-    raise CommandError(f'seed {spec.seed} gives no robot that stays in its bounds')
+    raise CommandError(f'seed {spec.seed} gives no robot that stays in its bounds '
+                       'and shows its effect')
 
 
 def prepare(folders: Folders, specs: Sequence[Spec], jobs: int,

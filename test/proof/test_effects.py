@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lg_husky_sim.proof import cases, catalogue, effects, manoeuvres, robots, sensors
+from lg_husky_sim.proof import cases, catalogue, effects, manoeuvres, motion, robots, sensors
+from lg_husky_sim.proof.hidden import Change
 from lg_husky_sim.proof.integrate import COLUMNS
 from lg_husky_sim.proof.manoeuvres import Manoeuvre
 import numpy as np
@@ -44,18 +45,18 @@ def drive() -> Manoeuvre:
     return Manoeuvre('short', times, commands)
 
 
-def hide(effect: str, severity: str = 'strong', onset: str = 'none') -> cases.Hidden:
+def hide(effect: str, severity: str = 'strong', onset: str = 'none') -> motion.Hidden:
     kind = 'single' if effect in catalogue.SUBSYSTEM else 'outside'
     spec = cases.Spec(5, kind, effects=(effect,), severity=severity, onset=onset)
     rng = np.random.default_rng(5)
-    hidden, told = cases.conceal(spec, robots.open_loop_robot(rng), (drive(),), rng)
+    hidden, told, _ = cases.conceal(spec, robots.open_loop_robot(rng), (drive(),), rng)
     assert told[0]['effect'] == effect
     assert told[0]['parameters']
     return hidden
 
 
-def moved(hidden: cases.Hidden) -> dict[str, float]:
-    return cases.visibility(hidden, (drive(),), [(0.0, 0.0, 0.0)])
+def moved(hidden: motion.Hidden) -> dict[str, float]:
+    return motion.visibility(hidden, (drive(),), [(0.0, 0.0, 0.0)])
 
 
 def test_every_effect_of_the_catalogue_and_more_can_be_hidden() -> None:
@@ -85,7 +86,7 @@ def test_a_stronger_effect_shows_more(effect: str) -> None:
 def test_a_sensor_fault_leaves_the_motion_alone_and_shows_in_its_stream(effect: str) -> None:
     hidden = hide(effect)
     assert moved(hidden) == dict.fromkeys(CHANNELS, 0.0)
-    table = cases.run(hidden, drive(), (0.0, 0.0, 0.0), 0, None)
+    table = motion.run(hidden, drive(), (0.0, 0.0, 0.0), 0, None)
     faulty = sensors.ideal(table, drive(), hidden.senses)
     healthy = sensors.ideal(table, drive(), hidden.robot.senses)
     changed = {name for name in ('joints', 'imu', 'poses')
@@ -104,8 +105,8 @@ def test_a_sensor_fault_leaves_the_motion_alone_and_shows_in_its_stream(effect: 
 def test_wind_pushes_only_where_chance_is_allowed() -> None:
     hidden = hide('wind_gusts')
     rng = np.random.default_rng(1)
-    blown = cases.run(hidden, drive(), (0.0, 0.0, 0.0), 0, rng)
-    calm = cases.run(replace(hidden, gusts=0.0), drive(), (0.0, 0.0, 0.0), 0,
+    blown = motion.run(hidden, drive(), (0.0, 0.0, 0.0), 0, rng)
+    calm = motion.run(replace(hidden, gusts=0.0), drive(), (0.0, 0.0, 0.0), 0,
                      np.random.default_rng(1))
     k = COLUMNS.index('forward')
     assert np.sqrt(np.mean((blown[:, k] - calm[:, k]) ** 2)) > 0.02
@@ -117,9 +118,9 @@ def test_an_effect_with_an_onset_in_time_is_absent_before(effect: str) -> None:
     assert hidden.onset == 'time'
     pose = (0.0, 0.0, 0.0)
     senses = replace(hidden.senses, since=hidden.onset_time)
-    with_it = sensors.publish(cases.run(hidden, drive(), pose, 0, None), drive(), senses,
+    with_it = sensors.publish(motion.run(hidden, drive(), pose, 0, None), drive(), senses,
                               np.random.default_rng(3))
-    without = sensors.publish(cases.run(hidden, drive(), pose, 0, None, with_effect=False),
+    without = sensors.publish(motion.run(hidden, drive(), pose, 0, None, with_effect=False),
                               drive(), hidden.robot.senses, np.random.default_rng(3))
     early = with_it.imu[:, 0] < hidden.onset_time - 0.1
     assert np.abs(with_it.imu - without.imu)[early, 1].max() < 1e-9
@@ -129,8 +130,8 @@ def test_an_effect_with_an_onset_in_time_is_absent_before(effect: str) -> None:
 def test_an_effect_at_a_place_holds_beyond_it() -> None:
     hidden = replace(hide('rolling_resistance'), onset='place', onset_x=1.0)
     pose = (0.0, 0.0, 0.0)
-    table = cases.run(hidden, drive(), pose, None, None)
-    plain = cases.run(hidden, drive(), pose, None, None, with_effect=False)
+    table = motion.run(hidden, drive(), pose, None, None)
+    plain = motion.run(hidden, drive(), pose, None, None, with_effect=False)
     x, v = COLUMNS.index('x'), COLUMNS.index('forward')
     before = np.arange(table.shape[0]) < np.argmax(table[:, x] > 0.8)
     assert np.abs(table[before, v] - plain[before, v]).max() < 1e-12
@@ -146,3 +147,44 @@ def test_drives_start_and_end_at_rest_within_what_a_husky_is_asked(name: str) ->
         assert np.abs(one.commands[:, 0]).max() <= 1.1
         assert np.abs(one.commands[:, 1]).max() <= 1.2
         assert np.abs(one.commands).max() > 0.3
+
+
+def ahead() -> Manoeuvre:
+    times = np.arange(100) / 20.0
+    return Manoeuvre('ahead', times, np.column_stack([np.where(times < 3.0, 0.8, 0.0),
+                                                      np.zeros(100)]))
+
+
+def build(effect: str) -> tuple[motion.Hidden, list[Change]]:
+    rng = np.random.default_rng(5)
+    kind = 'single' if effect in catalogue.SUBSYSTEM else 'outside'
+    spec = cases.Spec(5, kind, effects=(effect,), severity='strong')
+    hidden, _, changes = cases.conceal(spec, robots.open_loop_robot(rng), (ahead(),), rng)
+    return hidden, changes
+
+
+def test_an_effect_that_its_drives_cannot_show_is_refused() -> None:
+    hidden, changes = build('reverse_gain')
+    with pytest.raises(cases.NoTraceError, match='no trace'):
+        cases.check_traces(hidden, changes, (ahead(),), [(0.0, 0.0, 0.0)])
+    cases.check_traces(hidden, changes, (ahead(), drive()), [(0.0, 0.0, 0.0)] * 2)
+
+
+@pytest.mark.parametrize('effect', ['coulomb_drivetrain', 'command_slew', 'gyro_bias',
+                                    'wind_gusts'])
+def test_an_effect_that_shows_in_its_channel_is_not_refused(effect: str) -> None:
+    hidden, changes = build(effect)
+    cases.check_traces(hidden, changes, (ahead(),), [(0.0, 0.0, 0.0)])
+
+
+def test_each_effect_of_a_pair_is_looked_at_alone() -> None:
+    rng = np.random.default_rng(6)
+    spec = cases.Spec(6, 'pair', effects=('payload', 'command_slew'), severity='strong')
+    robot = robots.open_loop_robot(rng)
+    hidden, _, changes = cases.conceal(spec, robot, (drive(),), rng)
+    heavy, slow = (cases.alone(hidden, change) for change in changes)
+    assert heavy.fields['mass'] == hidden.fields['mass'] != robot.fields['mass']
+    assert heavy.command.slew_forward == robot.command.slew_forward
+    assert slow.command.slew_forward == hidden.command.slew_forward != (
+        robot.command.slew_forward)
+    assert slow.fields == robot.fields

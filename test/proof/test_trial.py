@@ -91,6 +91,17 @@ def test_preparing_again_makes_nothing_new(prepared: trial.Folders) -> None:
     assert path.stat().st_mtime_ns == before
 
 
+def test_what_the_drives_cannot_show_is_drawn_again(tmp_path: Path) -> None:
+    folders = trial.Folders(tmp_path)
+    spec = Spec(1, 'outside', drive='paper', effects=('reverse_gain',), severity='medium')
+    sealed = trial.prepare(folders, (spec,), 1, lambda _: None)
+    (name,) = sealed
+    answer = json.loads((folders.answers / f'{name}.json').read_text())
+    assert answer['spec']['seed'] != 1
+    assert [one['severity'] for one in answer['effects']] == ['medium']
+    assert answer['effects'][0]['effect'] != 'reverse_gain'
+
+
 def test_a_folder_holds_one_trial(prepared: trial.Folders) -> None:
     trial.keep_plan(prepared, SPECS)
     with pytest.raises(CommandError, match='holds another trial'):
