@@ -199,8 +199,9 @@ def alone(hidden: Hidden, change: Change) -> Hidden:
     fields = {**robot.fields, **change.fields}
     command: dict[str, Any] = {
         'since': hidden.command.since, **_commanded(robot, fields, change)}
+    senses: dict[str, Any] = {**change.senses}
     return replace(hidden, fields=fields, command=replace(robot.command, **command),
-                   senses=replace(robot.senses, **change.senses), gusts=change.gusts)
+                   senses=replace(robot.senses, **senses), gusts=change.gusts)
 
 
 def check_traces(hidden: Hidden, changes: Sequence[Change],
