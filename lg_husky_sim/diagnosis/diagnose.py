@@ -14,6 +14,7 @@ from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
 from lg_husky_sim.diagnosis.mismatches import mismatches
+from lg_husky_sim.diagnosis.plausible import check_wheel_rates
 from lg_husky_sim.diagnosis.result import Diagnosis, Finding, Verdict
 from lg_husky_sim.diagnosis.search import Progress, Search, search
 from lg_husky_sim.diagnosis.unnamed import described, look_for_unnamed, Unnamed
@@ -121,10 +122,11 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     RecordingError
         If a recording cannot be used.
     DiagnosisError
-        If names collide.
+        If names collide, or wheels turn faster than any do.
     """
     parts = usable_segments([*baseline, *recordings])
     whole = observations(parts)
+    check_wheel_rates(whole, nominal)
     names = [r.name for r in recordings]
     if baseline:
         from lg_husky_sim.diagnosis.change import search_change

@@ -13,9 +13,11 @@ from __future__ import annotations
 
 import math
 
+from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.evidence import FOLDS, folds_of
 from lg_husky_sim.diagnosis.fits import Fit, shared_metric
-from lg_husky_sim.diagnosis.screening import Projector
+from lg_husky_sim.diagnosis.misfit import is_far
+from lg_husky_sim.diagnosis.screening import Projector, Signature
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.unnamed import ridge, Unnamed
 from lg_husky_sim.husky.effects import Subsystem
@@ -30,6 +32,9 @@ THIN, THIN_WEIGHT = 400.0, 0.5
 #: Most that a remaining function of the reading takes away, and the part of the finding's gain
 #: at which half of it is taken.
 GUISE_WEIGHT, GUISE_HALF = 0.6, 0.1
+#: The same by its size, however much the finding gained: most, half of it [nats], and what chance
+#: may bring.
+SIZE_WEIGHT, SIZE_HALF, CHANCE = 0.3, 400.0, 60.0
 #: Part of what the named effects gained from which a further effect that was not adopted, or a
 #: smooth effort in another subsystem, says that the names are a guise; least such gain [nats].
 FURTHER_PART, SMOOTH_PART, LEAST_LEFT = 0.2, 0.4, 85.0
@@ -49,6 +54,8 @@ OWN = {
         'smooth_voltage', 'voltage'), 'voltage_saturation': ('smooth_voltage', 'voltage')}
 #: Gain below which a name must explain every stretch [nats], and the losses that it may have.
 SLIGHT_GAIN, SLIGHT_UNSTABLE = 200.0, 0.12
+#: Share of what was unexplained below which names are none where the model stays far off.
+FAINT = 0.1
 
 
 def further_gain(search: Search) -> float:
@@ -77,6 +84,8 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
     named = [r for r in search.rounds if r.adopted]
     gained = sum(r.rivals[0].held_out for r in named)
     if gained < SLIGHT_GAIN and named[0].instability > SLIGHT_UNSTABLE:
+        return True
+    if sum(r.share for r in named) < FAINT and is_far(search):
         return True
     effects = [r.rivals[0].effect for r in named]
     places = {effect.kind.subsystem for effect in effects}
@@ -111,7 +120,10 @@ def reading_gain(observations: Observations, fit: Fit) -> float:
     solution = fit.solution
     columns = {name: hats(solution.predicted, observations.channel_mask(name))
                for name in observations.channels}
-    metric = shared_metric(observations, fit, [])
+    # Errors that are a function of the reading last as long as the reading does: an estimate of
+    # the noise that does not know of them takes them for noise.
+    metric = shared_metric(observations, fit, [
+        Signature(candidates()[0], {}, own, True) for own in columns.values()])
     deviations = np.array([u.deviation for u in solution.unknowns])
     residual = observations.measured - solution.predicted
     projector = Projector(observations, metric, residual, solution.jacobian, deviations,
@@ -162,4 +174,6 @@ def belief(gain: float, share: float, remaining: float) -> float:
     """
     thin = THIN_WEIGHT * math.exp(-max(gain, 0.0) / THIN) * (1.0 - min(max(share, 0.0), 1.0))
     left = max(remaining, 0.0) / max(gain, 1.0)
-    return (1.0 - thin) * (1.0 - GUISE_WEIGHT * left / (left + GUISE_HALF))
+    size = max(remaining - CHANCE, 0.0)
+    return (1.0 - thin) * (1.0 - GUISE_WEIGHT * left / (left + GUISE_HALF)) * (
+        1.0 - SIZE_WEIGHT * size / (size + SIZE_HALF))

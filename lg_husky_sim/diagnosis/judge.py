@@ -11,6 +11,7 @@ from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
 from lg_husky_sim.diagnosis.doubts import belief, further_gain, reading_gain
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
+from lg_husky_sim.diagnosis.misfit import is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
 from lg_husky_sim.diagnosis.rivals import CHANGE_SHARE, Rival
@@ -36,6 +37,9 @@ SMOOTH_CHANGE = 4000.0
 #: The same before anything is refitted: signatures of the catalogue explain it then, and none of
 #: their refits does [nats].
 SCREENED_CHANGE = 500.0
+#: Held-out gain at which nothing missing is even with something, and its width [nats]; then of a
+#: change between recordings.
+SURE = ((20.0, 6.0), (125.0, 30.0))
 #: Way per wheel angle [m/rad] below which the ground does not push the robot: a twentieth of
 #: the smallest wheel.
 NO_GRIP = 0.015
@@ -175,8 +179,11 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     Returns
     -------
     bool
-        Whether an effect or a description explains more than chance, however little of it.
+        Whether an effect or a description explains more than chance, however little of it, or
+        the model is so far from the data that something must be missing.
     """
+    if is_far(search):
+        return True
     first = search.rounds[0]
     screened = first.scores[0].gain if first.scores else 0.0
     tried = max((r.held_out for r in first.rivals), default=0.0)
@@ -311,16 +318,18 @@ def confidence(search: Search, verdict: Verdict, unnamed: Unnamed | None = None)
     first = search.rounds[0]
     strongest = max((r.held_out for r in first.rivals), default=0.0)
     if verdict is Verdict.NOTHING_MISSING:
-        return float(1.0 / (1.0 + np.exp((strongest - 20.0) / 6.0)))
+        half, width = SURE[search.change is not None]
+        return float(1.0 / (1.0 + np.exp((strongest - half) / width)))
     if verdict is Verdict.UNKNOWN:
         strongest = max(strongest, 0.0 if unnamed is None else unnamed.held_out)
-        return float(1.0 / (1.0 + np.exp(-(strongest - CERTAIN) / 15.0)) * 0.5 + 0.4)
+        far = 1.0 if is_far(search) else 0.0
+        return float(max(1.0 / (1.0 + np.exp(-(strongest - CERTAIN) / 15.0)), far) * 0.5 + 0.4)
     by_name: dict[str, float] = {}
     for rival in first.rivals:
         by_name[rival.effect.id] = max(by_name.get(rival.effect.id, -np.inf), rival.held_out)
     gains = sorted(by_name.values(), reverse=True)
     remaining = max(reading_gain(search.observations, search.final), further_gain(search))
-    return name_confidence(gains) * belief(strongest, first.share, remaining)
+    return name_confidence(gains) * belief(strongest, first.share, remaining) * trust(search)
 
 
 def recalibration(search: Search, nominal: Parameters) -> tuple[Estimate, ...]:

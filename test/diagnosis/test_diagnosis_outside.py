@@ -159,7 +159,10 @@ def test_guise_leaves_much_beside_what_was_named(
     (300.0, 0.04, 0.1, 1, False, False), (1500.0, 0.04, 0.1, 1, False, True),
     (300.0, 0.04, 0.4, 0, True, True), (300.0, 0.1, 0.05, 1, True, True),
     (300.0, 0.2, 0.2, 1, True, False), (700.0, 0.05, 0.01, 1, True, True),
-    (90.0, 0.6, 0.4, 1, True, True), (90.0, 0.3, 0.01, 1, True, False)])
+    (90.0, 0.6, 0.4, 1, True, True), (90.0, 0.3, 0.01, 1, True, False),
+    (450.0, 0.25, 0.38, 1, True, True), (450.0, 0.25, 0.45, 1, True, False),
+    (300.0, 0.6, 0.45, 1, False, True), (300.0, 0.4, 0.45, 1, False, False),
+    (300.0, 0.6, 0.45, 0, False, False)])
 def test_effect_is_adopted_for_gain_share_and_steadiness(
         gain: float, share: float, unstable: float, number: int, change: bool, adopted: bool,
         fitted: Callable[[Effect], Fit]) -> None:

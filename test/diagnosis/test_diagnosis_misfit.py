@@ -1,0 +1,131 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far a model stays from the data says that something is missing, or that a name is not it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.doubts import belief, reading_gain
+from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate, shared_metric
+from lg_husky_sim.diagnosis.judge import confidence, is_unnamed
+from lg_husky_sim.diagnosis.misfit import against_before, is_far, mean_squares, trust
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.rivals import Rival
+from lg_husky_sim.diagnosis.rounds import Round
+from lg_husky_sim.diagnosis.search import Search
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.identification.problem import Observations, observations
+from lg_husky_sim.recording import Recording, segments
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+import pytest
+
+Drive = Callable[..., Recording]
+SCALE = Effect('gyro_scale')
+
+
+@pytest.fixture(scope='module')
+def data(drive: Drive) -> Observations:
+    parts = [*segments(drive('before', 'nothing', 1)), *segments(drive('after', 'nothing', 2))]
+    return observations(parts)
+
+
+@pytest.fixture(scope='module')
+def plain(data: Observations) -> Fit:
+    model = load_model()
+    return recalibrate(data, model.structure, model.parameters)
+
+
+def searched(data: Observations, plain: Fit, final: Fit, change: bool = False,
+             adopted: bool = False) -> Search:
+    used = shared_metric(data, plain, [])
+    rivals = (Rival(SCALE, None, final, 900.0, 900.0),) if adopted else ()
+    onset = Onset(OnsetKind.TIME, 0.0, 'after') if change else None
+    return Search(data, plain, final, (Round(plain, (), rivals, used, 0.9, adopted),),
+                  load_model().parameters, onset)
+
+
+def off(data: Observations, fit: Fit, channel: str, sizes: float, recordings: Sequence[str]
+        ) -> Fit:
+    """Return a fit that misses a channel by so many noise levels, up and down each second."""
+    predicted = fit.solution.predicted.copy()
+    scale = shared_metric(data, fit, []).scale
+    for one in data.slices:
+        if one.channel == channel and data.pieces[one.piece].recording in recordings:
+            part = slice(one.first, one.last)
+            sign = np.where(data.times[part] % 2.0 < 1.0, 1.0, -1.0)
+            predicted[part] += np.where(scale[part] > 0.0, sign * sizes / np.where(
+                scale[part] > 0.0, scale[part], 1.0), 0.0)
+    return replace(fit, solution=replace(fit.solution, predicted=predicted))
+
+
+def test_a_right_model_is_at_the_noise(data: Observations, plain: Fit) -> None:
+    squares = mean_squares(data, plain, shared_metric(data, plain, []))
+    assert set(squares) == set(data.channels)
+    assert all(0.2 < square < 2.0 for square in squares.values())
+    assert not is_far(searched(data, plain, plain))
+
+
+@pytest.mark.parametrize(('channel', 'sizes', 'far'), [
+    ('yaw_rate', 2.0, False), ('yaw_rate', 5.0, True), ('wheel_left', 1.5, False),
+    ('wheel_left', 3.0, True), ('advance', 0.5, False), ('advance', 2.5, True)])
+def test_nothing_missing_is_no_answer_far_from_the_noise(
+        channel: str, sizes: float, far: bool, data: Observations, plain: Fit) -> None:
+    search = searched(data, plain, off(data, plain, channel, sizes, data.recordings))
+    assert is_far(search) is far
+    assert is_unnamed(search, None) is far
+    if far:
+        assert confidence(search, Verdict.UNKNOWN) == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize(('recordings', 'far'), [
+    (('after',), True), (('before', 'after'), False), (('before',), False)])
+def test_a_change_is_measured_by_what_was_left_before(
+        recordings: Sequence[str], far: bool, data: Observations, plain: Fit) -> None:
+    """Two noise levels in both are a poor model of the robot, and no change."""
+    worse = off(data, plain, 'wheel_right', 2.0, recordings)
+    search = searched(data, plain, worse, change=True)
+    assert is_far(search) is far
+    assert (against_before(search, worse, False) > 3.0) is far
+    assert (trust(replace(search, plain=plain)) < 0.95) is far
+
+
+def test_a_name_that_leaves_much_is_believed_less(data: Observations, plain: Fit) -> None:
+    worst, bad = (off(data, plain, 'yaw_rate', sizes, data.recordings) for sizes in (9.0, 4.0))
+    explained = trust(searched(data, worst, plain, adopted=True))
+    half = trust(searched(data, worst, bad, adopted=True))
+    hardly = trust(searched(data, bad, bad, adopted=True))
+    assert 1.0 >= explained > 0.95 > half > hardly > 0.5
+
+
+def clipped(recording: Recording, rate: float) -> Recording:
+    imu = recording.stream('imu')
+    values: FloatArray = imu.values.copy()
+    values[:, 0] = np.clip(values[:, 0], -rate, rate)
+    streams = {**recording.streams, 'imu': replace(imu, values=values)}
+    return replace(recording, streams=streams)
+
+
+def test_a_clipping_gyro_is_seen_behind_one_that_reads_too_little(drive: Drive) -> None:
+    """Its name leaves an error that is a function of the reading, and lasts as long as it does."""
+    model = load_model()
+    gains = {}
+    for name, recordings in (
+            ('scaled', [drive('ahead', 'sensor', 1), drive('back', 'sensor', 2, True)]),
+            ('clipped', [clipped(drive('ahead', 'nothing', 1), 0.6),
+                         clipped(drive('back', 'nothing', 2, True), 0.6)])):
+        own = observations([s for r in recordings for s in segments(r)])
+        base = recalibrate(own, model.structure, model.parameters)
+        fit = fit_structure(own, model.structure.with_effect(SCALE), model.parameters,
+                            shared_metric(own, base, []), base.solution.values,
+                            {'gyro_factor': 0.9}, 12)
+        assert fit is not None
+        assert fit.parameters['gyro_factor'] < 0.97
+        gains[name] = reading_gain(own, fit)
+    assert gains['scaled'] < 40.0
+    assert gains['clipped'] > 100.0
+    assert belief(1000.0, 0.9, gains['clipped']) < 0.8 < 0.99 < belief(
+        1000.0, 0.9, 0.1 * gains['scaled'])
