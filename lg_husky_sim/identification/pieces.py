@@ -86,6 +86,8 @@ class Piece:
         Initial angles [rad]; zero where no positions were recorded.
     told : tuple of bool
         Whether each number of :attr:`began` was measured at the start.
+    turned : TimeSeries or None
+        Measured wheel angles, for the resets.
     """
 
     recording: str
@@ -99,6 +101,7 @@ class Piece:
     wheel_rates: tuple[float, float]
     wheel_angles: tuple[float, float]
     told: tuple[bool, bool, bool, bool] = (True, True, True, True)
+    turned: TimeSeries | None = None
 
     @property
     def name(self) -> str:
@@ -214,8 +217,9 @@ def piece_of(segment: Segment, settle: float = SETTLE) -> Piece | None:
     if not kept:
         return None
     angles = streams.get('wheel_angles')
+    angles = angles if angles is not None and len(angles) else None
     start_angles = (0.0, 0.0)
-    if angles is not None and len(angles):
+    if angles is not None:
         start_angles = (float(np.interp(start, angles.times, angles.column('left'))),
                         float(np.interp(start, angles.times, angles.column('right'))))
     return Piece(segment.recording, segment.index, start, count, streams['command'], kept,
@@ -223,7 +227,7 @@ def piece_of(segment: Segment, settle: float = SETTLE) -> Piece | None:
                  BodyTwist() if still else BodyTwist(forward, yaw),
                  (0.0, 0.0) if still else (rates[0], rates[1]), start_angles,
                  (pose_told, imu_told if imu is not None else pose_told, wheels_told,
-                  wheels_told))
+                  wheels_told), angles)
 
 
 def _after(channel: Channel, begin: float) -> Channel:

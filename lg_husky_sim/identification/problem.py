@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TypeAlias
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.plant import ENCODER_WINDOW, Plant, SensorModel
+from lg_husky_sim.identification.piece_simulation import simulate_piece
 from lg_husky_sim.identification.pieces import (
     Channel,
     CHANNELS,
@@ -28,17 +29,15 @@ from lg_husky_sim.identification.pieces import (
     UNITS,
 )
 from lg_husky_sim.recording import Segment
-from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
-from lg_husky_sim.simulation.kernel import COLUMNS, run
-from lg_husky_sim.simulation.simulator import hold, Simulator
+from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.simulation.kernel import COLUMNS
+from lg_husky_sim.simulation.simulator import Simulator
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = ['CHANNELS', 'PERIOD', 'UNITS', 'Channel', 'Observations', 'Piece', 'Slice',
            'late_mask', 'observations', 'piece_of', 'simulate_piece']
 
-#: Time between two resets of the simulated pose to the measured one [s].
-RESET = 4.0
 Simulated: TypeAlias = tuple[FloatArray, tuple[FloatArray, ...]]
 _COLUMN = {name: i for i, name in enumerate(COLUMNS)}
 
@@ -223,77 +222,6 @@ class Observations:
     def subset(self, keep: Sequence[bool]) -> Observations:
         """Return the observations of some of the pieces."""
         return Observations(tuple(p for p, k in zip(self.pieces, keep, strict=True) if k))
-
-
-def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
-                   correction: FloatArray | None = None) -> FloatArray:
-    """
-    Simulate a piece on its grid.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        At :data:`PERIOD`.
-    piece : Piece
-    latency : float
-        Further dead time of the commands [s].
-    correction : numpy.ndarray, shape (4,), optional
-        Of the measured state at the start.
-
-    Returns
-    -------
-    numpy.ndarray, shape (count + 1, 15)
-        The kernel's columns; pose columns follow the measured pose at the resets.
-    """
-    commands = piece.commands
-    held = _held(piece, latency)
-    twist, rates = piece.twist, piece.wheel_rates
-    if correction is not None:
-        forward, yaw, left, right = (float(c) for c in np.add(piece.began, correction))
-        twist, rates = BodyTwist(forward, yaw), (left, right)
-    stride = max(1, round(RESET / PERIOD)) if piece.pose is not None else piece.count or 1
-    poses = _poses(piece, stride)
-    state = simulator.initial(poses[0], twist, piece.start, rates, piece.wheel_angles)
-    flat = np.array(state.flat)
-    if len(commands) and commands.times[0] <= piece.start + PERIOD:
-        _fill_command(flat, state.n, held)
-    out = np.empty((piece.count + 1, len(COLUMNS)))
-    out[0] = state.row
-    for first in range(0, piece.count, stride):
-        last = min(first + stride, piece.count)
-        if piece.pose is not None and first:
-            now = poses[first // stride]
-            flat[state.n + 3:state.n + 6] = now.heading, now.x, now.y
-        run(flat, held[first:last], out[first + 1:last + 1],
-            *simulator.operators.arguments)  # type: ignore[arg-type]
-    return out
-
-
-@lru_cache(maxsize=256)
-def _held(piece: Piece, latency: float) -> FloatArray:
-    commands = piece.commands
-    if latency:
-        commands = TimeSeries(commands.times + latency, commands.values, commands.names)
-    return hold(commands, piece.start, PERIOD, piece.count)
-
-
-def _fill_command(flat: FloatArray, n: int, held: FloatArray) -> None:
-    # What was commanded before a segment is taken to be its first command.
-    from lg_husky_sim.simulation.kernel import DELAY
-    base = n + 11
-    flat[base:base + 2] = held[0]
-    flat[base + 3:base + 3 + DELAY] = held[0, 0]
-    flat[base + 3 + DELAY:] = held[0, 1]
-
-
-@lru_cache(maxsize=256)
-def _poses(piece: Piece, stride: int) -> tuple[Pose, ...]:
-    # Measured poses at the start and at each reset.
-    if piece.pose is None:
-        return (Pose(),)
-    times = piece.start + np.arange(0, max(piece.count, 1), stride) * PERIOD
-    columns = [np.interp(times, piece.pose.times, piece.pose.values[:, i]) for i in range(3)]
-    return tuple(Pose(*row) for row in np.column_stack(columns).tolist())
 
 
 def _sample(column: FloatArray, start: float, times: FloatArray) -> FloatArray:

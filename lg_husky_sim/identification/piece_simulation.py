@@ -1,0 +1,108 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Simulate one piece of a recording by its commands, from where it was measured to be."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from lg_husky_sim.identification.pieces import PERIOD, Piece
+from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
+from lg_husky_sim.simulation.kernel import COLUMNS, DELAY, run
+from lg_husky_sim.simulation.simulator import hold, Simulator
+import numpy as np
+
+#: Time between two resets of the simulated pose and wheel angles to the measured ones [s].
+RESET = 4.0
+#: Columns of the wheel angles.
+ANGLES = [COLUMNS.index('angle_left'), COLUMNS.index('angle_right')]
+
+
+def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
+                   correction: FloatArray | None = None) -> FloatArray:
+    """
+    Simulate a piece on its grid.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        At :data:`PERIOD`.
+    piece : Piece
+    latency : float
+        Further dead time of the commands [s].
+    correction : numpy.ndarray, shape (4,), optional
+        Of the measured state at the start.
+
+    Returns
+    -------
+    numpy.ndarray, shape (count + 1, 15)
+        The kernel's columns; pose columns follow the measured pose at the resets. What depends on
+        a wheel's angle follows the measured one there, too: it would be out of phase after a few
+        turns otherwise. The angle columns go on without a jump.
+    """
+    commands = piece.commands
+    held = _held(piece, latency)
+    twist, rates = piece.twist, piece.wheel_rates
+    if correction is not None:
+        forward, yaw, left, right = (float(c) for c in np.add(piece.began, correction))
+        twist, rates = BodyTwist(forward, yaw), (left, right)
+    known = piece.pose is not None or piece.turned is not None
+    stride = max(1, round(RESET / PERIOD)) if known else piece.count or 1
+    poses, angles = _poses(piece, stride), _angles(piece, stride)
+    state = simulator.initial(poses[0], twist, piece.start, rates, piece.wheel_angles)
+    flat = np.array(state.flat)
+    if len(commands) and commands.times[0] <= piece.start + PERIOD:
+        _fill_command(flat, state.n, held)
+    out = np.empty((piece.count + 1, len(COLUMNS)))
+    out[0] = state.row
+    ahead = np.zeros(2)
+    for first in range(0, piece.count, stride):
+        last = min(first + stride, piece.count)
+        if piece.pose is not None and first:
+            now = poses[first // stride]
+            flat[state.n + 3:state.n + 6] = now.heading, now.x, now.y
+        if angles is not None and first:
+            # An encoder turns with its motor, a play ahead of the wheel.
+            wheel = angles[first // stride] - flat[state.n + 9:state.n + 11]
+            ahead += flat[state.n:state.n + 2] - wheel
+            flat[state.n:state.n + 2] = wheel
+        run(flat, held[first:last], out[first + 1:last + 1],
+            *simulator.operators.arguments)  # type: ignore[arg-type]
+        out[first + 1:last + 1, ANGLES] += ahead
+    return out
+
+
+@lru_cache(maxsize=256)
+def _held(piece: Piece, latency: float) -> FloatArray:
+    commands = piece.commands
+    if latency:
+        commands = TimeSeries(commands.times + latency, commands.values, commands.names)
+    return hold(commands, piece.start, PERIOD, piece.count)
+
+
+def _fill_command(flat: FloatArray, n: int, held: FloatArray) -> None:
+    # What was commanded before a segment is taken to be its first command.
+    base = n + 11
+    flat[base:base + 2] = held[0]
+    flat[base + 3:base + 3 + DELAY] = held[0, 0]
+    flat[base + 3 + DELAY:] = held[0, 1]
+
+
+@lru_cache(maxsize=256)
+def _angles(piece: Piece, stride: int) -> FloatArray | None:
+    # Measured wheel angles at the start and at each reset, shape (n, 2).
+    if piece.turned is None:
+        return None
+    times = piece.start + np.arange(0, max(piece.count, 1), stride) * PERIOD
+    return np.column_stack([np.interp(times, piece.turned.times, piece.turned.column(side))
+                            for side in ('left', 'right')])
+
+
+@lru_cache(maxsize=256)
+def _poses(piece: Piece, stride: int) -> tuple[Pose, ...]:
+    # Measured poses at the start and at each reset.
+    if piece.pose is None:
+        return (Pose(),)
+    times = piece.start + np.arange(0, max(piece.count, 1), stride) * PERIOD
+    columns = [np.interp(times, piece.pose.times, piece.pose.values[:, i]) for i in range(3)]
+    return tuple(Pose(*row) for row in np.column_stack(columns).tolist())
