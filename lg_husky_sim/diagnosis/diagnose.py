@@ -26,6 +26,9 @@ from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.recording import Recording, Segment, segments
 import numpy as np
 
+#: Part of what a smooth effort gains that a guise must add to stay in the model beside it.
+MATERIAL = 0.01
+
 
 @dataclass(frozen=True, eq=False)
 class Case:
@@ -180,15 +183,21 @@ def _without_name(found: Search, whole: Observations, unnamed: Unnamed
     if found.final is not found.plain:
         options.append((found.plain, look_for_unnamed(whole, found.plain, found.change)))
     folds, made = folds_of(whole), []
+
+    def cost(fit: Fit) -> float:
+        return float(np.sum(held_out_cost(whole, fit, unnamed.metric, folds)))
     for base, looked in options:
         finding, description = judge.unnamed_finding(found, looked)
         fit = None if description is None else described(
             whole, base, found.nominal, looked, description)
-        fit = None if fit is None else ordered(fit, whole.recordings)
-        used = found.final if fit is None else fit
-        cost = float(np.sum(held_out_cost(whole, used, unnamed.metric, folds)))
-        made.append((cost + judge.NEAR_NATS * len(used.structure.effects), finding, fit))
-    _, finding, fit = min(made, key=lambda one: one[0])
+        if fit is not None and description is not None:
+            fit = ordered(fit, whole.recordings)
+            finding, _ = judge.unnamed_finding(found, looked.refitted(fit, description))
+        made.append((cost(found.final if fit is None else fit), finding, fit))
+    material = max(judge.NEAR_NATS, MATERIAL * (
+        cost(found.plain) - min(one[0] for one in made)))
+    _, finding, fit = min(made, key=lambda one: one[0] + material * len((
+        found.final if one[2] is None else one[2]).structure.effects))
     return finding, fit
 
 

@@ -11,7 +11,7 @@ from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
 from lg_husky_sim.diagnosis.doubts import belief, further_gain, reading_gain
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
-from lg_husky_sim.diagnosis.misfit import is_far, trust
+from lg_husky_sim.diagnosis.misfit import against_before, is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
 from lg_husky_sim.diagnosis.rivals import CHANGE_SHARE, Rival
@@ -32,8 +32,9 @@ CERTAIN, FOLLOWED = 45.0, 25.0
 EVIDENT, SMOOTH_SHARE = 85.0, 0.05
 #: The same for a change between recordings, where much else differs a little [nats].
 CERTAIN_CHANGE = 250.0
-#: The same of a smooth effort that begins with the later recordings [nats].
-SMOOTH_CHANGE = 4000.0
+#: The same of a smooth effort that begins with the later recordings [nats], and how much farther
+#: these must then be from the model than the earlier ones.
+SMOOTH_CHANGE, SMOOTH_FARTHER = 1000.0, 1.6
 #: The same before anything is refitted: signatures of the catalogue explain it then, and none of
 #: their refits does [nats].
 SCREENED_CHANGE = 500.0
@@ -191,7 +192,8 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
         return screened > SCREENED_CHANGE or (
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]) or (
             unnamed is not None and unnamed.held_out > SMOOTH_CHANGE
-            and unnamed.share > CHANGE_SHARE[1])
+            and unnamed.share > CHANGE_SHARE[1]
+            and against_before(search, search.final, True) > SMOOTH_FARTHER)
     return tried > EVIDENT or (screened > CERTAIN and tried > FOLLOWED) or (
         unnamed is not None and unnamed.held_out > EVIDENT and unnamed.share > SMOOTH_SHARE)
 

@@ -224,6 +224,13 @@ class Unnamed:
         """Return the share of the unexplained energy that a description explains."""
         return (self.energy - description.energy) / max(self.energy - 0.5 * self.count, 1e-9)
 
+    def refitted(self, fit: Fit, description: Description) -> Unnamed:
+        """Return the same with the knots that one of the descriptions has in a fit."""
+        knots = tuple(fit.parameters[name] for name in KNOTS)
+        return replace(self, descriptions=tuple(
+            replace(one, knots=knots) if one is description else one
+            for one in self.descriptions))
+
     @property
     def held_out(self) -> float:
         """Held-out gain of the best description [nats]; 0 without one."""

@@ -184,7 +184,9 @@ def test_play_may_help_in_some_stretches_only(
 
 def test_a_name_is_believed_less_the_more_it_leaves() -> None:
     assert belief(5000.0, 0.9, 0.0) > 0.99
-    assert belief(5000.0, 0.9, 500.0) == pytest.approx(0.7, abs=0.01)
+    # A tenth of the gain takes 0.3 away; its size, beyond chance, a share of another 0.3.
+    assert belief(5000.0, 0.9, 500.0) == pytest.approx(0.7 * (1.0 - 0.3 * 440.0 / 840.0))
+    assert belief(1e6, 0.9, 500.0) == pytest.approx(1.0 - 0.3 * 440.0 / 840.0, abs=0.01)
     assert belief(100.0, 0.1, 0.0) < 0.7
 
 
