@@ -13,6 +13,7 @@ from lg_husky_sim.diagnosis.doubts import is_guise
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
+from lg_husky_sim.diagnosis.misfit import against_before, MORE
 from lg_husky_sim.diagnosis.mismatches import mismatches
 from lg_husky_sim.diagnosis.plausible import check_wheel_rates
 from lg_husky_sim.diagnosis.result import Diagnosis, Finding, Verdict
@@ -225,4 +226,10 @@ def _notes(found: Search) -> tuple[str, ...]:
     notes = []
     if bound:
         notes.append('at the edge of what a recalibration may use up: ' + ', '.join(bound))
+    if found.change is not None and any(r.adopted for r in found.rounds):
+        more = against_before(found, found.final, False)
+        if more > MORE:
+            notes.append(f'with what was found, the later recordings are still {more:.1f} times '
+                         'as far from the model as the earlier ones (mean square of the worst '
+                         'channel): the law is near, and not it')
     return tuple(notes)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis.diagnose import _notes
 from lg_husky_sim.diagnosis.doubts import belief, reading_gain
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate, shared_metric
 from lg_husky_sim.diagnosis.judge import confidence, is_unnamed
@@ -91,6 +92,14 @@ def test_a_change_is_measured_by_what_was_left_before(
     assert is_far(search) is far
     assert (against_before(search, worse, False) > 3.0) is far
     assert (trust(replace(search, plain=plain)) < 0.95) is far
+
+
+@pytest.mark.parametrize(('sizes', 'said'), [(0.0, False), (3.0, True)])
+def test_a_note_says_that_a_change_is_only_near(
+        sizes: float, said: bool, data: Observations, plain: Fit) -> None:
+    final = off(data, plain, 'yaw_rate', sizes, ('after',))
+    notes = _notes(searched(data, plain, final, change=True, adopted=True))
+    assert any('times as far from the model as the earlier ones' in n for n in notes) is said
 
 
 def test_a_name_that_leaves_much_is_believed_less(data: Observations, plain: Fit) -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+import re
 
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.diagnose import Case, diagnose
@@ -59,7 +60,10 @@ def test_effort_without_a_name_is_described_and_modelled(record: Record) -> None
     assert found.verdict is Verdict.UNKNOWN
     (finding,) = found.findings
     assert (finding.effect, finding.subsystem) == ('unknown', 'translation')
-    assert 'smooth function of yaw' in finding.statement
+    said = re.search(r'smooth function of yaw, between (\S+) and (\S+) N', finding.statement)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(0.0, abs=2.0)
+    assert 25.0 < float(said[2]) < 45.0
     assert [(e.id, e.shape) for e in found.model.structure.effects] == [('smooth_force', 'yaw')]
     for name in ('position_rmse_m', 'forward_rmse'):
         assert found.held_out_augmented[name] < 0.8 * found.held_out_plain[name], name
