@@ -174,7 +174,7 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
         judge.recalibration(found, nominal.parameters),
         errors(plant_of(found.plain), own), errors(plant_of(final), own),
         plain_out, augmented_out, _remaining(found, unnamed), model,
-        model_of(found.plain, 'recalibrated, nothing added'), _notes(found))
+        model_of(found.plain, 'recalibrated, nothing added'), _notes(found, verdict))
 
 
 def _without_name(found: Search, whole: Observations, unnamed: Unnamed
@@ -221,15 +221,15 @@ def _remaining(found: Search, unnamed: Unnamed | None) -> str:
     return text
 
 
-def _notes(found: Search) -> tuple[str, ...]:
+def _notes(found: Search, verdict: Verdict) -> tuple[str, ...]:
     bound = found.final.solution.at_bound
     notes = []
     if bound:
         notes.append('at the edge of what a recalibration may use up: ' + ', '.join(bound))
-    if found.change is not None and any(r.adopted for r in found.rounds):
+    if verdict is Verdict.KNOWN:
         more = against_before(found, found.final, False)
         if more > MORE:
-            notes.append(f'with what was found, the later recordings are still {more:.1f} times '
-                         'as far from the model as the earlier ones (mean square of the worst '
-                         'channel): the law is near, and not it')
+            notes.append(f'the later recordings are still {more:.1f} times as far from the model '
+                         'as the earlier ones (mean square of the worst channel): what was named '
+                         'comes near, but is not the whole of it')
     return tuple(notes)

@@ -85,7 +85,8 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
     gained = sum(r.rivals[0].held_out for r in named)
     if gained < SLIGHT_GAIN and named[0].instability > SLIGHT_UNSTABLE:
         return True
-    if sum(r.share for r in named) < FAINT and is_far(search):
+    left = math.prod(1.0 - min(max(r.share, 0.0), 1.0) for r in named)
+    if 1.0 - left < FAINT and is_far(search):
         return True
     effects = [r.rivals[0].effect for r in named]
     places = {effect.kind.subsystem for effect in effects}
@@ -96,10 +97,10 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
                 if (d.effect.id, d.effect.shape) in own), default=0.0)
     foreign = [d for d in unnamed.descriptions if d.held_out > CLEARLY * mine]
     elsewhere = [d for d in foreign if d.effect.kind.subsystem not in places]
-    left = [(further_gain(search), FURTHER_PART)]
-    left += [(d.held_out, SMOOTH_PART) for d in elsewhere[:1]]
-    left += [(d.held_out, ANYWHERE_PART) for d in foreign[:1]]
-    return any(gain > max(LEAST_LEFT, part * gained) for gain, part in left)
+    beside = [(further_gain(search), FURTHER_PART)]
+    beside += [(d.held_out, SMOOTH_PART) for d in elsewhere[:1]]
+    beside += [(d.held_out, ANYWHERE_PART) for d in foreign[:1]]
+    return any(gain > max(LEAST_LEFT, part * gained) for gain, part in beside)
 
 
 def reading_gain(observations: Observations, fit: Fit) -> float:
@@ -165,7 +166,8 @@ def belief(gain: float, share: float, remaining: float) -> float:
     share : float
         Of what was unexplained.
     remaining : float
-        Of :func:`reading_gain` [nats].
+        What is still explained beside it [nats]: by :func:`reading_gain`, or by a further effect
+        that was not adopted.
 
     Returns
     -------

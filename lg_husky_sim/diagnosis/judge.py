@@ -11,7 +11,7 @@ from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
 from lg_husky_sim.diagnosis.doubts import belief, further_gain, reading_gain
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
-from lg_husky_sim.diagnosis.misfit import against_before, is_far, trust
+from lg_husky_sim.diagnosis.misfit import against_before, beyond_chance, farthest, is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
 from lg_husky_sim.diagnosis.rivals import CHANGE_SHARE, Rival
@@ -19,7 +19,7 @@ from lg_husky_sim.diagnosis.rounds import Round
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
-from lg_husky_sim.husky.effects import Effect, LATER, Onset, OnsetKind
+from lg_husky_sim.husky.effects import Effect, LATER, Onset, OnsetKind, Subsystem
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.problem import Observations
 import numpy as np
@@ -47,6 +47,10 @@ NO_GRIP = 0.015
 #: A rival within this share of the winner's held-out gain, or this many nats, is as good.
 NEAR_SHARE = 0.06
 NEAR_NATS = 10.0
+#: Part of the robot that a channel tells of, where nothing else does.
+SHOWS = {'wheel_left': Subsystem.DRIVETRAIN, 'wheel_right': Subsystem.DRIVETRAIN,
+         'yaw_rate': Subsystem.ROTATION, 'turn': Subsystem.ROTATION,
+         'advance': Subsystem.TRANSLATION}
 #: Parameter whose sign says to which side an effect acts: positive to the left.
 SIDE_OF = {'yaw_pull': 'pull_moment'}
 
@@ -193,7 +197,8 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]) or (
             unnamed is not None and unnamed.held_out > SMOOTH_CHANGE
             and unnamed.share > CHANGE_SHARE[1]
-            and against_before(search, search.final, True) > SMOOTH_FARTHER)
+            and against_before(search, search.final, True) > beyond_chance(
+                search, SMOOTH_FARTHER))
     return tried > EVIDENT or (screened > CERTAIN and tried > FOLLOWED) or (
         unnamed is not None and unnamed.held_out > EVIDENT and unnamed.share > SMOOTH_SHARE)
 
@@ -257,6 +262,15 @@ def description_words(description: Description) -> str:
     return words + _side_words(effect)
 
 
+def distance_words(search: Search) -> str:
+    """Return in a sentence how far the data are from the model."""
+    channel, square, _ = farthest(search)
+    than = ('noise' if search.change is None else 'distance in the earlier recordings, errors '
+            'taken off that may be alike in all')
+    return (f'The {channel.replace("_", " ")} is far from the model: {square:.1f} times its '
+            f'{than} (mean square).')
+
+
 def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Description | None]:
     """
     Return the finding of an unknown effect.
@@ -287,6 +301,11 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
             words += (f' The nearest entry, {first.rivals[0].effect.id}, leaves too much to be '
                       'its name.')
         gain = best.held_out
+    elif near is None and not first.scores:
+        channel, _, _ = farthest(search)
+        return Finding('unknown', 'none', SHOWS[channel].value, (), 'not determined', None, (),
+                       0.0, 0.0, 0.0, (), 'Something is missing that is not in the catalogue, '
+                       f'and nothing in it comes near. {distance_words(search)}'), None
     else:
         effect = near.effect if near is not None else first.scores[0].signature.candidate.effect
         kind = effect.kind
@@ -296,6 +315,8 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
         words = (f'Something is missing that is not in the catalogue; the nearest entry, '
                  f'{effect.id}, explains {100.0 * max(first.share, 0.0):.1f} % of it, and '
                  f'{doubt}.')
+    if is_far(search):
+        words += f' {distance_words(search)}'
     return Finding('unknown', 'none', kind.subsystem.value, kind.elements, 'not determined',
                    None, (), gain, p_value(gain, 9, len(candidates())), unnamed.share, rivals,
                    words), best if described else None

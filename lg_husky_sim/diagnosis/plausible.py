@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Refuse wheel rates that no wheel has: a unit, or a driver, is wrong, and no physics."""
+"""Refuse wheel rates that no wheel can have: a wrong unit or a faulty driver, no physics."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 #: Part of a recording's wheel rates that may be anything; largest multiple of the model's rates
@@ -31,14 +32,18 @@ def check_wheel_rates(observations: Observations, nominal: ModelFile) -> None:
         If more than a few of a recording's wheel rates are beyond belief.
     """
     predicted = observations.predict(compile_model(nominal.structure).at(nominal.parameters))
+    said: dict[tuple[str, str], list[FloatArray]] = {}
+    done: dict[tuple[str, str], float] = {}
     for one in observations.slices:
-        if not one.channel.startswith('wheel'):
-            continue
         part = slice(one.first, one.last)
-        said = float(np.quantile(np.abs(observations.measured[part]), 1.0 - ODD))
-        most = max(BELIEVED, MULTIPLE * float(np.max(np.abs(predicted[part]))))
-        if said > most:
+        if one.channel.startswith('wheel') and one.last > one.first:
+            key = (observations.pieces[one.piece].recording, one.channel)
+            said.setdefault(key, []).append(np.abs(observations.measured[part]))
+            done[key] = max(done.get(key, 0.0), float(np.max(np.abs(predicted[part]))))
+    for (recording, channel), values in said.items():
+        rate = float(np.quantile(np.concatenate(values), 1.0 - ODD))
+        most = max(BELIEVED, MULTIPLE * done[recording, channel])
+        if rate > most:
             raise DiagnosisError(
-                f'recording {observations.pieces[one.piece].recording}: '
-                f'{one.channel.replace("_", " ")} turns at {said:.3g} rad/s; '
+                f'recording {recording}: {channel.replace("_", " ")} turns at {rate:.3g} rad/s; '
                 f'up to {most:.3g} rad/s is possible: wheel rates must be in rad/s')

@@ -26,15 +26,15 @@ UNSTABLE = (0.35, 0.45)
 #: The same of effects whose state nobody sees: where in its play an idling gear lies when a
 #: crossing begins differs from stretch to stretch.
 UNSEEN = {'gear_backlash': 0.6}
-#: Share of the unexplained energy from which a further effect may lose more, and that ratio then:
-#: what still differs beside it moves, too.
+#: A further effect that explains at least this share of the unexplained energy may lose more over
+#: held-out blocks: up to the second number.
 HALF, UNSTABLE_HALF = 0.5, 0.5
 #: Least share of the unexplained energy that a change between recordings must explain: with a
 #: gain above the first and the second number of nats that follow.
 CHANGE_SHARE = (0.035, 0.025)
 CHANGE_GAIN = (80.0, 250.0)
 #: Gain, share and largest instability of a further change. What the first one only approximates
-#: helps in some stretches and harms in others; a second effect helps wherever it acts.
+#: helps in some stretches and harms in others; a small second effect must help wherever it acts.
 FURTHER_CHANGE = ((80.0, 0.5, 0.45), (400.0, 0.2, 0.4), (180.0, 0.08, 0.1), (500.0, 0.03, 0.05))
 #: Share by which an effect that scales all that the ground does must be better than others.
 SWEEPING = 0.15
@@ -103,8 +103,8 @@ def adopts(best: Rival, share: float, unstable: float, rest: float, number: int,
     if all(found[p.name] == found.entry(p.name).lower == 0.0
            for p in best.effect.parameters() if not p.fixed):
         return False
-    most = UNSTABLE_HALF if number > 0 and share > HALF else UNSTABLE[change]
-    if best.held_out < LEAST_GAIN[late] or unstable > UNSEEN.get(best.effect.id, most):
+    unsteady = UNSTABLE_HALF if number > 0 and share > HALF else UNSTABLE[change]
+    if best.held_out < LEAST_GAIN[late] or unstable > UNSEEN.get(best.effect.id, unsteady):
         return False
     if change and number > 0:
         return any(best.held_out > gain and share > least and unstable < most

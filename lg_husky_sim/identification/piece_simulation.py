@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from lg_husky_sim.husky.plant import SensorModel
 from lg_husky_sim.identification.pieces import PERIOD, Piece
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation.kernel import COLUMNS, DELAY, run
@@ -37,8 +38,9 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
     -------
     numpy.ndarray, shape (count + 1, 15)
         The kernel's columns; pose columns follow the measured pose at the resets. What depends on
-        a wheel's angle follows the measured one there, too: it would be out of phase after a few
-        turns otherwise. The angle columns go on without a jump.
+        a wheel's angle follows the measured one there, too, read as by the sensors before an
+        onset: it would be out of phase after a few turns otherwise. The angle columns go on
+        without a jump.
     """
     commands = piece.commands
     held = _held(piece, latency)
@@ -48,7 +50,8 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
         twist, rates = BodyTwist(forward, yaw), (left, right)
     known = piece.pose is not None or piece.turned is not None
     stride = max(1, round(RESET / PERIOD)) if known else piece.count or 1
-    poses, angles = _poses(piece, stride), _angles(piece, stride)
+    poses = _poses(piece, stride)
+    angles = _angles(piece, stride, simulator.plant.sets[0].sensors)
     state = simulator.initial(poses[0], twist, piece.start, rates, piece.wheel_angles)
     flat = np.array(state.flat)
     if len(commands) and commands.times[0] <= piece.start + PERIOD:
@@ -88,14 +91,23 @@ def _fill_command(flat: FloatArray, n: int, held: FloatArray) -> None:
     flat[base + 3 + DELAY:] = held[0, 1]
 
 
-@lru_cache(maxsize=256)
-def _angles(piece: Piece, stride: int) -> FloatArray | None:
-    # Measured wheel angles at the start and at each reset, shape (n, 2).
+def _angles(piece: Piece, stride: int, sensors: SensorModel) -> FloatArray | None:
+    # Wheel angles at the start and at each reset, by what the encoders read; shape (n, 2).
     if piece.turned is None:
         return None
-    times = piece.start + np.arange(0, max(piece.count, 1), stride) * PERIOD
-    return np.column_stack([np.interp(times, piece.turned.times, piece.turned.column(side))
-                            for side in ('left', 'right')])
+    times = _resets(piece, stride) + sensors.delay_wheels
+    angles = np.empty((times.size, 2))
+    for k, (side, factor) in enumerate((('left', sensors.encoder_left),
+                                        ('right', sensors.encoder_right))):
+        read = np.interp(times, piece.turned.times, piece.turned.column(side))
+        angles[:, k] = piece.wheel_angles[k] + (read - read[0]) / factor
+    return angles
+
+
+def _resets(piece: Piece, stride: int) -> FloatArray:
+    steps = np.arange(0, max(piece.count, 1), stride, dtype=np.float64)
+    times: FloatArray = piece.start + steps * PERIOD
+    return times
 
 
 @lru_cache(maxsize=256)
@@ -103,6 +115,6 @@ def _poses(piece: Piece, stride: int) -> tuple[Pose, ...]:
     # Measured poses at the start and at each reset.
     if piece.pose is None:
         return (Pose(),)
-    times = piece.start + np.arange(0, max(piece.count, 1), stride) * PERIOD
+    times = _resets(piece, stride)
     columns = [np.interp(times, piece.pose.times, piece.pose.values[:, i]) for i in range(3)]
     return tuple(Pose(*row) for row in np.column_stack(columns).tolist())

@@ -3,8 +3,8 @@
 """
 Recorded segments as one vector of measurements, and the model's prediction of it.
 
-The simulated pose is set back to the measured one every few seconds, so that physics that
-depends on heading or place acts where the robot really was.
+Simulated pose and wheel angles are set back to the measured ones every few seconds, so that
+physics that depends on heading, place or a wheel's angle acts where the robot really was.
 """
 
 from __future__ import annotations

@@ -197,8 +197,7 @@ def alone(hidden: Hidden, change: Change) -> Hidden:
     """Return the same robot with one of its effects only."""
     robot = hidden.robot
     fields = {**robot.fields, **change.fields}
-    command: dict[str, Any] = {
-        'since': hidden.command.since, **_commanded(robot, fields, change)}
+    command: dict[str, Any] = {**_commanded(robot, fields, change)}
     senses: dict[str, Any] = {**change.senses}
     return replace(hidden, fields=fields, command=replace(robot.command, **command),
                    senses=replace(robot.senses, **senses), gusts=change.gusts)
@@ -212,8 +211,8 @@ def check_traces(hidden: Hidden, changes: Sequence[Change],
     Raises
     ------
     NoTraceError
-        An effect alone moves no channel by `LEAST_TRACE` of its noise; faults of sensors
-        and wind show without any motion.
+        An effect alone moves no channel by `LEAST_TRACE` of its noise. Faults of sensors and
+        wind, which move nothing by themselves, are not looked at.
 
     """
     for change in changes:

@@ -9,6 +9,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from lg_husky_sim.proof.motion import LEAST_TRACE
+
 Json = Mapping[str, Any]
 
 _ABOUT = """\
@@ -34,7 +36,7 @@ No two robots are alike: damping and scrub differ by up to 30 %, the voltage gai
 inertia by 5 to 10 %, every floor is rough, encoders count ticks, stamps jitter, commands get
 lost or come a few milliseconds late, poses have gaps, gyros a small bias. Where the drives that
 were drawn cannot show an effect (a weak reverse gear, and nothing goes backwards: it moves no
-channel by 0.03 of its noise), another robot with another effect is drawn.
+channel by {least:g} of its noise), another robot with another effect is drawn.
 """
 
 
@@ -108,6 +110,7 @@ def _trials(results: Json) -> Sequence[Json]:
 def _about(results: Json) -> str:
     trials = _trials(results)
     return _ABOUT.format(
+        least=LEAST_TRACE,
         these='the command' if len(trials) == 1 else 'the commands',
         command='\n    '.join(one['command'] for one in trials),
         seal='` and `'.join(one['seal'][:16] for one in trials),

@@ -45,7 +45,8 @@ def plan(count: int, seed: int, world: str = 'g1', drive: str = 'mix') -> tuple[
     Return the cases of a trial, in random order.
 
     Every effect of the catalogue comes up equally often (within one), severities in
-    the proportion weak 1, medium 2, strong 2.
+    the proportion weak 1, medium 2, strong 2. Where a case's drives cannot show its effect,
+    `trial.prepare` draws another one.
 
     Parameters
     ----------

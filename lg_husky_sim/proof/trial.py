@@ -97,7 +97,7 @@ def _generate(spec: Spec, name: str, folders: Folders) -> tuple[str, str]:
             # This draw drives the robot out of its bounds, or its drives cannot show the effect:
             # take the next, the same for everyone; another effect where none can be seen.
             if isinstance(error, NoTraceError):
-                spec = replace(spec, effects=())
+                spec = replace(spec, effects=(), onset='')
             for place in (folders.cases, folders.held_out):
                 shutil.rmtree(place / name, ignore_errors=True)
     raise CommandError(f'seed {spec.seed} gives no robot that stays in its bounds '

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 COUNT = 1200
+STAMPS: FloatArray = PERIOD * np.arange(COUNT + 1, dtype=np.float64)
 AFTER = round(RESET / PERIOD) + 1
 RATE = COLUMNS.index('wheel_left')
 
@@ -32,8 +33,7 @@ def plant(torque: float) -> Plant:
 
 def simulated(torque: float, angles: FloatArray | None = None) -> FloatArray:
     commands = TimeSeries(np.array([0.0]), np.array([[0.6, 0.0]]), ('forward', 'yaw'))
-    turned = None if angles is None else TimeSeries(
-        PERIOD * np.arange(COUNT + 1), angles, ('left', 'right'))
+    turned = None if angles is None else TimeSeries(STAMPS, angles, ('left', 'right'))
     piece = Piece('drive', 0, 0.0, COUNT, commands, (), None, BodyTwist(), (0.0, 0.0),
                   (0.0, 0.0), turned=turned)
     return simulate_piece(Simulator(plant(torque), PERIOD, fine_pose=False), piece)
@@ -48,7 +48,8 @@ def test_measured_angles_that_agree_change_nothing() -> None:
 
 def test_the_phase_follows_the_measured_wheel() -> None:
     free, smooth = simulated(2.0), simulated(0.0)
-    opposite = simulated(2.0, free[:, ANGLES] + np.pi)
+    elsewhere = free[:, ANGLES] + np.where(np.arange(COUNT + 1) > 0, np.pi, 0.0)[:, None]
+    opposite = simulated(2.0, elsewhere)
     own = (free - smooth)[AFTER + 100:2 * AFTER, RATE]
     other = (opposite - smooth)[AFTER + 100:2 * AFTER, RATE]
     own, other = own - own.mean(), other - other.mean()
@@ -57,22 +58,36 @@ def test_the_phase_follows_the_measured_wheel() -> None:
 
 def test_the_encoder_goes_on_without_a_jump() -> None:
     angles = simulated(2.0)[:, ANGLES]
-    steps = np.diff(simulated(2.0, angles + np.array([1.0, -2.0]))[:, ANGLES], axis=0)
+    elsewhere = angles + np.array([1.0, -2.0])
+    elsewhere[0] = angles[0]
+    moved = simulated(2.0, elsewhere)[:, ANGLES]
+    assert float(np.max(np.abs(moved - angles))) > 1e-3
+    steps = np.diff(moved, axis=0)
     assert float(np.max(np.abs(steps))) < 1.2 * float(np.max(np.abs(np.diff(angles, axis=0))))
 
 
-def test_the_play_of_a_gear_is_no_angle_of_the_wheel() -> None:
-    """An encoder that is ahead by the play says where the wheel is all the same."""
-    model, play = load_model(), Effect('gear_backlash')
-    loose = compile_model(model.structure.with_effect(play)).at(
-        model.parameters.with_entries(*effect_entries(play, {'play': 0.2})))
-    stamps = np.array([0.0, 3.0, 6.0])
-    commands = TimeSeries(stamps, np.array([[0.6, 0.0], [-0.6, 0.0], [0.6, 0.0]]),
-                          ('forward', 'yaw'))
+def test_a_play_and_a_faulty_encoder_do_not_move_the_wheel() -> None:
+    """What an encoder reads is turned back into the wheel's own angle."""
+    model = load_model()
+    ripple, play, scale = (Effect('torque_ripple', 'both'), Effect('gear_backlash'),
+                           Effect('encoder_scale', 'left'))
+    structure = model.structure.with_effect(ripple).with_effect(play).with_effect(scale)
+    odd = compile_model(structure).at(model.parameters.with_entries(
+        *effect_entries(ripple, {'ripple_cos': 2.0, 'ripple_sin': 0.0}),
+        *effect_entries(play, {'play': 1.0}), *effect_entries(scale, {'encoder_factor': 0.8})))
+    assert odd.sets[0].sensors.encoder_left == pytest.approx(0.8)
+    commands = TimeSeries(np.array([0.0, 3.0, 6.0]), np.array(
+        [[0.6, 0.0], [-0.6, 0.0], [0.6, 0.0]]), ('forward', 'yaw'))
     piece = Piece('drive', 0, 0.0, COUNT, commands, (), None, BodyTwist(), (0.0, 0.0),
                   (0.0, 0.0))
-    simulator = Simulator(loose, PERIOD, fine_pose=False)
+    simulator = Simulator(odd, PERIOD, fine_pose=False)
     free = simulate_piece(simulator, piece)
-    held = simulate_piece(simulator, replace(piece, turned=TimeSeries(
-        PERIOD * np.arange(COUNT + 1), free[:, ANGLES], ('left', 'right'))))
-    assert held == pytest.approx(free, abs=1e-9)
+
+    def held(factor: float, shift: float) -> FloatArray:
+        read = free[:, ANGLES] * np.array([factor, 1.0])
+        read[1:] += shift
+        return simulate_piece(simulator, replace(piece, turned=TimeSeries(
+            STAMPS, read, ('left', 'right'))))
+    assert held(0.8, 0.0) == pytest.approx(free, abs=1e-9)
+    for wrong in (held(1.0, 0.0), held(0.8, 1.0)):
+        assert float(np.max(np.abs(wrong - free)[:, RATE])) > 0.05
