@@ -107,7 +107,7 @@ def test_wind_pushes_only_where_chance_is_allowed() -> None:
     rng = np.random.default_rng(1)
     blown = motion.run(hidden, drive(), (0.0, 0.0, 0.0), 0, rng)
     calm = motion.run(replace(hidden, gusts=0.0), drive(), (0.0, 0.0, 0.0), 0,
-                     np.random.default_rng(1))
+                      np.random.default_rng(1))
     k = COLUMNS.index('forward')
     assert np.sqrt(np.mean((blown[:, k] - calm[:, k]) ** 2)) > 0.02
 
