@@ -51,6 +51,9 @@ NEAR_NATS = 10.0
 SHOWS = {'wheel_left': Subsystem.DRIVETRAIN, 'wheel_right': Subsystem.DRIVETRAIN,
          'yaw_rate': Subsystem.ROTATION, 'turn': Subsystem.ROTATION,
          'advance': Subsystem.TRANSLATION}
+#: Arguments of a smooth effort, in words.
+WHEEL_ANGLES = {'angle': "the wheel's angle", 'angle_left': "the left wheel's angle",
+                'angle_right': "the right wheel's angle"}
 #: Parameter whose sign says to which side an effect acts: positive to the left.
 SIDE_OF = {'yaw_pull': 'pull_moment'}
 
@@ -258,7 +261,8 @@ def no_ground_reaction(search: Search) -> Finding:
 def description_words(description: Description) -> str:
     """Return a smooth description in words."""
     effect = description.effect
-    words = effect.kind.title.replace('{shape}', effect.shape.replace('_', ' '))
+    shape = WHEEL_ANGLES.get(effect.shape, effect.shape.replace('_', ' '))
+    words = effect.kind.title.replace('{shape}', shape)
     return words + _side_words(effect)
 
 

@@ -11,7 +11,12 @@ from lg_husky_sim.diagnosis.alike import with_common_errors
 from lg_husky_sim.diagnosis.diagnose import _notes
 from lg_husky_sim.diagnosis.doubts import belief, is_guise, reading_gain
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate, shared_metric
-from lg_husky_sim.diagnosis.judge import confidence, is_unnamed, unnamed_finding
+from lg_husky_sim.diagnosis.judge import (
+    confidence,
+    description_words,
+    is_unnamed,
+    unnamed_finding,
+)
 from lg_husky_sim.diagnosis.misfit import (
     against_before,
     beyond_chance,
@@ -208,6 +213,14 @@ def test_short_recordings_differ_by_chance(
     assert beyond_chance(change, ratio) == pytest.approx(limit, abs=0.02)
     longer = replace(data, pieces=tuple(replace(p, count=6100) for p in data.pieces))
     assert beyond_chance(replace(change, observations=longer), ratio) == ratio
+
+
+@pytest.mark.parametrize(('shape', 'words'), [
+    ('angle_right', "a smooth function of the right wheel's angle"),
+    ('yaw', 'a smooth function of yaw')])
+def test_a_description_says_what_it_depends_on(shape: str, words: str) -> None:
+    moment = Description(Effect('smooth_moment', shape=shape), 1.0, 1.0, (0.0,) * 9, (0.0, 1.0))
+    assert words in description_words(moment)
 
 
 def test_unknown_by_distance_alone_names_the_channel(data: Observations, plain: Fit) -> None:
