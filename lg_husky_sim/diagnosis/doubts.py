@@ -13,11 +13,10 @@ from __future__ import annotations
 
 import math
 
-from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.evidence import FOLDS, folds_of
-from lg_husky_sim.diagnosis.fits import Fit, shared_metric
+from lg_husky_sim.diagnosis.fits import Fit, metric_beside
 from lg_husky_sim.diagnosis.misfit import is_far
-from lg_husky_sim.diagnosis.screening import Projector, Signature
+from lg_husky_sim.diagnosis.screening import Projector
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.unnamed import ridge, Unnamed
 from lg_husky_sim.husky.effects import Subsystem
@@ -123,8 +122,7 @@ def reading_gain(observations: Observations, fit: Fit) -> float:
                for name in observations.channels}
     # Errors that are a function of the reading last as long as the reading does: an estimate of
     # the noise that does not know of them takes them for noise.
-    metric = shared_metric(observations, fit, [
-        Signature(candidates()[0], {}, own, True) for own in columns.values()])
+    metric = metric_beside(observations, fit, list(columns.values()))
     deviations = np.array([u.deviation for u in solution.unknowns])
     residual = observations.measured - solution.predicted
     projector = Projector(observations, metric, residual, solution.jacobian, deviations,

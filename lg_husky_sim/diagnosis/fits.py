@@ -245,13 +245,30 @@ def shared_metric(observations: Observations, fit: Fit, signatures: Sequence[Sig
     -------
     Metric
     """
+    return metric_beside(observations, fit, [s.columns for s in signatures])
+
+
+def metric_beside(observations: Observations, fit: Fit, columns: Sequence[FloatArray]) -> Metric:
+    """
+    Estimate the correlation on what neither a fit nor any of some columns explains.
+
+    Parameters
+    ----------
+    observations : Observations
+    fit : Fit
+    columns : sequence of numpy.ndarray, each of shape (n_values, k)
+        Each with a coefficient of its own in each recording.
+
+    Returns
+    -------
+    Metric
+    """
     predicted = fit.solution.predicted
     residual = observations.measured - predicted
     scale = scales(observations, residual, predicted)
     common = () if observations.common is None else (observations.common,)
     everywhere = _normed(np.column_stack([fit.solution.jacobian, *common]), scale)
-    own = _normed(np.column_stack([np.zeros((residual.size, 0)), *(
-        s.columns for s in signatures)]), scale)
+    own = _normed(np.column_stack([np.zeros((residual.size, 0)), *columns]), scale)
     left = residual
     weighted = scale
     for _ in range(3):

@@ -140,7 +140,7 @@ def farthest(search: Search) -> tuple[str, float, float]:
     Returns
     -------
     str
-        Name of the channel.
+        Name of the channel; empty where no channel was recorded both before and after a change.
     float
         Its mean square: in units of the noise, or of that before a change with errors taken off
         that may be alike in all recordings.
@@ -153,6 +153,8 @@ def farthest(search: Search) -> tuple[str, float, float]:
     else:
         found = mean_squares(search.observations, search.final, search.rounds[-1].metric)
         limits = FAR
+    if not found:
+        return '', 0.0, math.inf
     name = max(found, key=lambda one: found[one] / limits[one])
     return name, found[name], limits[name]
 
@@ -180,7 +182,7 @@ def trust(search: Search) -> float:
     """
     if search.change is not None:
         more = against_before(search, search.final, False)
-        return 1.0 - DISTRUST * max(0.0, 1.0 - MORE / more)
+        return 1.0 - DISTRUST * (1.0 - MORE / max(more, MORE))
     squares = mean_squares(search.observations, search.final, search.rounds[-1].metric)
     most = max(squares.values(), default=0.0)
     plain = mean_squares(search.observations, search.plain, search.rounds[-1].metric)

@@ -155,7 +155,7 @@ def _load(robot: robots.Robot, drive: manoeuvres.Manoeuvre) -> tuple[float, floa
 
 def conceal(spec: Spec, robot: robots.Robot, drives: tuple[manoeuvres.Manoeuvre, ...],
             rng: np.random.Generator) -> tuple[Hidden, list[dict[str, Any]], list[Change]]:
-    """Return the robot with its hidden effects, what the answer says of them, and each alone."""
+    """Return the robot with its effects, what the answer says of them, and their changes."""
     names, severities = choose(spec, rng)
     fields = dict(robot.fields)
     command: dict[str, Any] = {}

@@ -119,6 +119,19 @@ def test_a_note_says_that_a_change_is_only_near(
             said and verdict is Verdict.KNOWN)
 
 
+def test_nothing_in_common_before_and_after_is_not_far(data: Observations, plain: Fit) -> None:
+    """The gyro was there before a change only, everything else after it only."""
+    slices = tuple(s for s in data.slices if (s.channel == 'yaw_rate') is (
+        data.pieces[s.piece].recording == 'before'))
+    apart = replace(data)
+    apart.__dict__['slices'] = slices
+    search = searched(data, plain, plain, change=True)
+    search = replace(search, observations=apart)
+    assert ratios(search, plain, False) == {}
+    assert not is_far(search)
+    assert trust(search) == 1.0
+
+
 def test_a_name_that_leaves_much_is_believed_less(data: Observations, plain: Fit) -> None:
     worst, bad = (off(data, plain, 'yaw_rate', sizes, data.recordings) for sizes in (9.0, 4.0))
     explained = trust(searched(data, worst, plain, adopted=True))

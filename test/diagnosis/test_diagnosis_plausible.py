@@ -40,7 +40,12 @@ def test_ticks_are_no_radians(one: Recording) -> None:
         diagnose([with_rates(one, 500.0)], load_model(), lambda text, share: None)
 
 
-@pytest.mark.parametrize('factor', [0.0, 1.0, 3.0])
+def test_degrees_are_no_radians(one: Recording) -> None:
+    with pytest.raises(DiagnosisError, match='must be in rad/s'):
+        check_wheel_rates(data(with_rates(one, 180.0 / np.pi)), load_model())
+
+
+@pytest.mark.parametrize('factor', [0.0, 1.0, 3.0, 30.0 / np.pi])
 def test_what_a_wheel_may_do_is_not_refused(factor: float, one: Recording) -> None:
     check_wheel_rates(data(with_rates(one, factor)), load_model())
 
