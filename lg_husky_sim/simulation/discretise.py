@@ -10,7 +10,7 @@ import math
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import OnsetKind
-from lg_husky_sim.husky.laws import WIDTH
+from lg_husky_sim.husky.laws import Law, WIDTH
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.kernel import COMMAND, DELAY
@@ -169,9 +169,9 @@ def discretise(plant: Plant, period: float, *, fine_pose: bool = True) -> Operat
         a, b, g = _held(one)
         g = np.pad(g, ((0, 0), (0, efforts - g.shape[1])))
         whole = expm(_block(a, b, g, step) * step)[:size]
-        laws = np.pad(one.laws, (0, efforts - one.laws.size))
+        # What pads a set reads no argument: there may be none in the whole plant.
+        laws = np.pad(one.laws, (0, efforts - one.laws.size), constant_values=int(Law.HEADING))
         coefficients = np.array(_padded(one.coefficients, (efforts, WIDTH)))
-        coefficients[one.laws.size:, 1] = 1.0
         pieces: list[NDArray[np.generic]] = [
             np.array(_stage(one.command, period)),
             np.ascontiguousarray(whole[:, :size].T),

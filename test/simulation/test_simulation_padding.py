@@ -1,0 +1,31 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What makes the sets of a plant equally long reads no argument and adds no effort."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
+from lg_husky_sim.husky.laws import CONTEXT, evaluate, MEMORY
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.simulation.discretise import discretise
+import numpy as np
+import pytest
+
+Maker = Callable[..., Plant]
+#: Effects that may begin late; a slope has no argument, so that nothing at all is allocated.
+BEGINNING = sorted(name for name in catalogue() if name != 'speed_loop')
+
+
+@pytest.mark.parametrize('name', BEGINNING)
+def test_padding_reads_nothing_and_adds_nothing(robot: Maker, name: str) -> None:
+    plant = robot(Effect(name, late=True), onset=Onset(OnsetKind.TIME, 1.0))
+    _, _, _, *stacks = discretise(plant, 0.02).arguments
+    laws, coefficients, offsets = (np.asarray(stack) for stack in stacks[7:10])
+    for c, one in enumerate(plant.sets):
+        efforts, own = laws.shape[1], one.laws.size
+        z, memory, out = np.full(8, np.nan), np.full(MEMORY, np.nan), np.full(efforts, 7.0)
+        evaluate(c, laws, coefficients, offsets, z, np.ones(CONTEXT), memory, out)
+        np.testing.assert_array_equal(out[own:], 0.0)
+        assert not np.any(np.isin(laws[c, own:], (13, 14)))
