@@ -9,7 +9,7 @@ from pathlib import Path
 import shutil
 
 from click.testing import CliRunner
-from lg_husky_sim.cli.prove import command
+from lg_husky_sim.cli.main import cli
 from lg_husky_sim.errors import CommandError, LgHuskyError
 from lg_husky_sim.proof import trial
 from lg_husky_sim.proof.cases import Spec
@@ -133,7 +133,7 @@ def test_the_command_line_names_baselines_and_recordings(tmp_path: Path) -> None
 ])
 def test_seeds_of_the_other_kind_are_refused(tmp_path: Path, arguments: list[str],
                                              message: str) -> None:
-    result = CliRunner().invoke(command, [*arguments, '--out', str(tmp_path / 'out')])
+    result = CliRunner().invoke(cli, ['prove', *arguments, '--out', str(tmp_path / 'out')])
     assert isinstance(result.exception, CommandError)
     assert message in str(result.exception)
     assert not (tmp_path / 'out').exists()
@@ -142,7 +142,7 @@ def test_seeds_of_the_other_kind_are_refused(tmp_path: Path, arguments: list[str
 def test_each_trial_counts_once(tmp_path: Path) -> None:
     for pooled in (['--pool', str(tmp_path / 'out')],
                    ['--pool', str(tmp_path / 'one'), '--pool', str(tmp_path / 'one')]):
-        result = CliRunner().invoke(command, [*pooled, '--out', str(tmp_path / 'out')])
+        result = CliRunner().invoke(cli, ['prove', *pooled, '--out', str(tmp_path / 'out')])
         assert isinstance(result.exception, CommandError)
         assert 'each trial counts once' in str(result.exception)
     assert not (tmp_path / 'out').exists()
