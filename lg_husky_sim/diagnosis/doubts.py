@@ -36,9 +36,13 @@ GUISE_WEIGHT, GUISE_HALF = 0.6, 0.1
 SIZE_WEIGHT, SIZE_HALF, CHANCE = 0.3, 400.0, 60.0
 #: Part of what the named effects gained from which a further effect that was not adopted, or a
 #: smooth effort in another subsystem, says that the names are a guise; least such gain [nats].
-FURTHER_PART, SMOOTH_PART, LEAST_LEFT = 0.2, 0.4, 85.0
+FURTHER_PART, SMOOTH_PART, LEAST_LEFT = 0.2, 0.4, 110.0
 #: The same for a smooth effort anywhere.
 ANYWHERE_PART = 1.0
+#: The same for a function of one channel's own reading.
+READING_PART = 0.8
+#: Least gain of such a smooth effort that is confirmed by itself [nats].
+SEEN = 20.0
 #: Parts that all end in a torque on an axle.
 AXLE = {Subsystem.COMMAND, Subsystem.ELECTRICAL, Subsystem.DRIVETRAIN}
 #: The smooth effort that an effect is itself: where no other explains so much more, the element
@@ -94,9 +98,11 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
     own = {OWN[effect.id] for effect in effects if effect.id in OWN}
     mine = max((d.held_out for d in unnamed.descriptions
                 if (d.effect.id, d.effect.shape) in own), default=0.0)
-    foreign = [d for d in unnamed.descriptions if d.held_out > CLEARLY * mine]
+    foreign = [d for d in unnamed.descriptions if d.held_out > CLEARLY * mine and (
+        search.change is not None or d.confirmed > SEEN)]
     elsewhere = [d for d in foreign if d.effect.kind.subsystem not in places]
-    beside = [(further_gain(search), FURTHER_PART)]
+    beside = [(further_gain(search), FURTHER_PART),
+              (reading_gain(search.observations, search.final), READING_PART)]
     beside += [(d.held_out, SMOOTH_PART) for d in elsewhere[:1]]
     beside += [(d.held_out, ANYWHERE_PART) for d in foreign[:1]]
     return any(gain > max(LEAST_LEFT, part * gained) for gain, part in beside)

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
@@ -62,6 +64,13 @@ def held_out_cost(observations: Observations, fit: Fit, metric_: Metric, folds: 
         left = white[out] + own @ np.linalg.solve(curvature, own.T @ white[out])
         cost[out] = 0.5 * left ** 2
     return cost
+
+
+def strain(fit: Fit) -> float:
+    """Return what a recalibration costs: half the squared deviations from nominal [nats]."""
+    known = [u for u in fit.solution.unknowns if u.local is None and math.isfinite(u.deviation)]
+    return 0.5 * sum(((u.varied(fit.solution.values[u.name]) - u.centre) / u.deviation) ** 2
+                     for u in known)
 
 
 def energy(observations: Observations, fit: Fit, metric_: Metric) -> float:

@@ -26,6 +26,8 @@ from lg_husky_sim.identification.relations import rows_of_recordings
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
+#: Part by which a recalibration is far from a nominal number, or so many of its deviations.
+FAR_OFF, STRAINED = 0.3, 2.0
 #: Robust deviations from which an event that nothing explains loses weight.
 EVENT = 5.0
 #: Ridge on columns of unit length, against those that are alike.
@@ -219,7 +221,8 @@ def at_nominal(observations: Observations, base: Fit, nominal: Parameters) -> Fi
     start = {u.name: u.value(u.centre) if u.extra or u.name in RECALIBRATED
              else solution.values[u.name] for u in solution.unknowns}
     if all(abs(u.varied(solution.values[u.name]) - u.varied(start[u.name]))
-           < (0.3 if u.logarithmic else 1.5 * u.deviation) for u in solution.unknowns):
+           < (min(FAR_OFF, STRAINED * u.deviation) if u.logarithmic else 1.5 * u.deviation)
+           for u in solution.unknowns):
         return None
     order = {name: np.ones(1) for name in observations.channels}
     metric_ = Metric(np.ones(observations.measured.size), order)

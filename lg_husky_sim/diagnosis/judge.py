@@ -26,10 +26,16 @@ import numpy as np
 
 #: Gain of a signature from which something is missing, if a refit then predicts held-out data so
 #: much better [nats].
-CERTAIN, FOLLOWED = 45.0, 25.0
-#: Held-out gain of anything from which something is missing [nats], and the share of the
-#: unexplained that a smooth description must explain then.
-EVIDENT, SMOOTH_SHARE = 85.0, 0.05
+CERTAIN, FOLLOWED = 60.0, 30.0
+#: Held-out gain of an effect from which something is missing [nats]; then of a smooth description,
+#: and the share of the unexplained that it must explain then.
+EVIDENT, SMOOTH, SMOOTH_SHARE = 85.0, 110.0, 0.05
+#: Confirmed gain of a smooth description that is enough alone [nats]. A moment must have it: a
+#: rough floor turns a robot more than it does anything else.
+CONFIRMED = 25.0
+#: Held-out gain from which a smooth description is put into the model, and at which something
+#: missing is even with nothing, where it is not known [nats].
+DESCRIBED = 45.0
 #: The same for a change between recordings, where much else differs a little [nats].
 CERTAIN_CHANGE = 250.0
 #: The same of a smooth effort that begins with the later recordings [nats], and how much farther
@@ -202,8 +208,12 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
             and unnamed.share > CHANGE_SHARE[1]
             and against_before(search, search.final, True) > beyond_chance(
                 search, SMOOTH_FARTHER))
-    return tried > EVIDENT or (screened > CERTAIN and tried > FOLLOWED) or (
-        unnamed is not None and unnamed.held_out > EVIDENT and unnamed.share > SMOOTH_SHARE)
+    if tried > EVIDENT or (screened > CERTAIN and tried > FOLLOWED):
+        return True
+    if unnamed is None or not unnamed.descriptions or unnamed.share <= SMOOTH_SHARE:
+        return False
+    turns = unnamed.descriptions[0].effect.kind.subsystem is Subsystem.ROTATION
+    return unnamed.confirmed > CONFIRMED or (unnamed.held_out > SMOOTH and not turns)
 
 
 def rolls_without_moving(observations: Observations) -> bool:
@@ -295,7 +305,7 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
     rivals = _rivals(first, None)
     near = max(first.rivals, key=lambda r: r.held_out, default=None)
     best = unnamed.descriptions[0] if unnamed.descriptions else None
-    described = best is not None and best.held_out > CERTAIN and unnamed.share > 0.0
+    described = best is not None and best.held_out > DESCRIBED and unnamed.share > 0.0
     if described and best is not None and (near is None or best.held_out > 0.5 * near.held_out):
         kind = best.effect.kind
         words = (f'Something is missing that is not in the catalogue. It is described best by '
@@ -350,7 +360,7 @@ def confidence(search: Search, verdict: Verdict, unnamed: Unnamed | None = None)
     if verdict is Verdict.UNKNOWN:
         strongest = max(strongest, 0.0 if unnamed is None else unnamed.held_out)
         far = 1.0 if is_far(search) else 0.0
-        return float(max(1.0 / (1.0 + np.exp(-(strongest - CERTAIN) / 15.0)), far) * 0.5 + 0.4)
+        return float(max(1.0 / (1.0 + np.exp(-(strongest - DESCRIBED) / 15.0)), far) * 0.5 + 0.4)
     by_name: dict[str, float] = {}
     for rival in first.rivals:
         by_name[rival.effect.id] = max(by_name.get(rival.effect.id, -np.inf), rival.held_out)

@@ -24,7 +24,7 @@ LARGEST = 1e4
 NOISE = 0.5
 #: Mean square, in units of the noise, from which "nothing missing" is no answer. A rough floor
 #: shakes the yaw rate most, the wheels less, and what a pose moves by hardly at all.
-FAR = {'yaw_rate': 12.0, 'wheel_left': 4.0, 'wheel_right': 4.0, 'advance': 3.0, 'turn': 3.0}
+FAR = {'yaw_rate': 16.0, 'wheel_left': 4.0, 'wheel_right': 4.0, 'advance': 3.0, 'turn': 3.0}
 #: With recordings from before a change: multiple of their mean square from which it is none, if
 #: there are so many seconds of data on either side; of less, chance alone makes more.
 FARTHER, ENOUGH = 2.0, 60.0

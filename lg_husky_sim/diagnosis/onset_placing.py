@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.fits import extras_of, Fit, fit_structure
@@ -19,6 +20,9 @@ import numpy as np
 #: Fine steps around the best coarse onset [s, m], and how far they go in coarse steps.
 FINE = {OnsetKind.TIME: 0.1, OnsetKind.PLACE_ABOVE: 0.05, OnsetKind.PLACE_BELOW: 0.05}
 REACH = 1.2
+#: Valleys of the cost along coarse onsets that are looked into, and the points in each: a command
+#: that changes makes them narrower than a coarse step. Then how many of them are placed finely.
+VALLEYS, INSIDE, PLACED = 4, 11, 2
 #: Drop of the cost without the effect before an onset, its numbers unchanged, and after a refit,
 #: from which it begins there [nats].
 ABSENT, LATE = 5.0, 10.0
@@ -39,7 +43,7 @@ def _cost(observations: Observations, fit: Fit, metric: Metric, onset: Onset) ->
     return cost if np.isfinite(cost) else np.inf
 
 
-def _middle(onsets: list[Onset], costs: list[float]) -> Onset:
+def _middle(onsets: Sequence[Onset], costs: Sequence[float]) -> Onset:
     # Of the onsets that are as good as the best and adjacent to it, the middle one.
     best = int(np.argmin(costs))
     low = high = best
@@ -50,28 +54,20 @@ def _middle(onsets: list[Onset], costs: list[float]) -> Onset:
     return onsets[(low + high) // 2]
 
 
-def refined_onset(observations: Observations, fit: Fit, metric: Metric,
-                  change: Onset | None = None) -> Onset | None:
-    """
-    Return a better onset for a fitted late effect.
+def _valleys(costs: Sequence[float]) -> list[int]:
+    # Where the cost is lower than on either side, the lowest first.
+    padded = [np.inf, *costs, np.inf]
+    found = [i for i, cost in enumerate(costs) if padded[i] >= cost <= padded[i + 2]]
+    return sorted(found, key=lambda i: costs[i])[:VALLEYS]
 
-    Parameters
-    ----------
-    observations : Observations
-    fit : Fit
-        With an onset in its structure.
-    metric : Metric
-    change : Onset, optional
-        Before which no onset is tried.
 
-    Returns
-    -------
-    Onset or None
-        None where the structure has no onset.
-    """
-    onset = fit.structure.onset
-    if onset is None:
-        return None
+def _around(onset: Onset, moves: Iterable[float]) -> list[Onset]:
+    moved = [replace(onset, value=round(onset.value + move, 4)) for move in moves]
+    return [o for o in moved if o.value >= 0.0 or onset.kind is not OnsetKind.TIME]
+
+
+def _coarse(observations: Observations, onset: Onset, change: Onset | None) -> list[Onset]:
+    # Onsets of the same kind over all data, in the order of time or place.
     family = (time_onsets if onset.kind is OnsetKind.TIME else place_onsets)(observations)
     named = onset.recording if onset.kind is not OnsetKind.TIME else ''
     coarse = [replace(o, recording=named or o.recording) for o, _ in family.onsets
@@ -85,15 +81,56 @@ def refined_onset(observations: Observations, fit: Fit, metric: Metric,
     if onset.recording:
         # Onsets in a named recording lie on one line through all recordings.
         coarse.sort(key=lambda o: (observations.recordings.index(o.recording), o.value))
-    centre = _middle(coarse, [_cost(observations, fit, metric, o) for o in coarse])
+    return coarse
+
+
+def refined_onsets(observations: Observations, fit: Fit, metric: Metric,
+                   change: Onset | None = None) -> tuple[Onset, ...]:
+    """
+    Return better onsets for a fitted late effect.
+
+    Parameters
+    ----------
+    observations : Observations
+    fit : Fit
+        With an onset in its structure.
+    metric : Metric
+    change : Onset, optional
+        Before which no onset is tried.
+
+    Returns
+    -------
+    tuple of Onset
+        The best one first, then one of another valley of the cost: the numbers of the fit are
+        those of its own onset and speak for it. Empty where the structure has no onset.
+    """
+    onset = fit.structure.onset
+    if onset is None:
+        return ()
+
+    def costs_of(onsets: Sequence[Onset]) -> list[float]:
+        return [_cost(observations, fit, metric, o) for o in onsets]
+    coarse = _coarse(observations, onset, change)
     step = ONSET_STEP
     if onset.kind is not OnsetKind.TIME and len(coarse) > 1:
         step = abs(coarse[1].value - coarse[0].value)
+    costs = costs_of(coarse)
+    centres = [(min(costs), _middle(coarse, costs))]
+    for valley in _valleys(costs):
+        inside = _around(coarse[valley], (np.linspace(-1.0, 1.0, INSIDE) * step).tolist())
+        found = costs_of(inside)
+        if valley != int(np.argmin(costs)) or min(found) < min(costs) - FLAT:
+            centres.append((min(found), _middle(inside, found)))
     count = int(np.ceil(REACH * step / FINE[onset.kind]))
-    fine = [replace(centre, value=round(centre.value + k * FINE[onset.kind], 4))
-            for k in range(-count, count + 1)]
-    fine = [o for o in fine if o.value >= 0.0 or onset.kind is not OnsetKind.TIME]
-    return _middle(fine, [_cost(observations, fit, metric, o) for o in fine])
+    placed: list[tuple[float, Onset]] = []
+    for _, centre in sorted(centres, key=lambda one: one[0]):
+        if len(placed) < PLACED and not any(
+                o.recording == centre.recording and abs(o.value - centre.value) <= REACH * step
+                for _, o in placed):
+            fine = _around(centre, (k * FINE[onset.kind] for k in range(-count, count + 1)))
+            found = costs_of(fine)
+            placed.append((min(found), _middle(fine, found)))
+    return tuple(o for _, o in sorted(placed, key=lambda one: one[0]))
 
 
 def begun_late(observations: Observations, fit: Fit, nominal: Parameters, metric: Metric,

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.candidates import Candidate, neutral
@@ -65,6 +66,15 @@ def _sizes(score: Score) -> list[dict[str, float]]:
             start.items(), score.size, strict=True)} for part in GENTLER]
 
 
+def _others(candidate: Candidate, chosen: Mapping[str, float]) -> list[dict[str, float]]:
+    # The catalogue's other values of each number of an effect that has several of them.
+    if candidate.signed or len(chosen) < 2:
+        return []
+    return [{name: value} for name in chosen
+            for value in dict.fromkeys(start[name] for start in candidate.starts)
+            if value != chosen[name]]
+
+
 def refit(observations: Observations, base: Fit, nominal: Parameters, score: Score,
           metric_: Metric, steps: int = 2, start: Fit | None = None) -> Fit | None:
     """
@@ -96,12 +106,18 @@ def refit(observations: Observations, base: Fit, nominal: Parameters, score: Sco
         sizes = {**own, **_sizes(score)[0]}
         return fit_structure(observations, structure, nominal, metric_,
                              dict(start.solution.values), sizes, steps)
+
+    def cost(sized: Mapping[str, float]) -> float:
+        return cost_at(observations, structure, nominal, metric_,
+                       {**base.solution.values, **sized}, {**own, **sized})
     # The signature is a straight line through a bent world: begin where it is really best.
-    tried = []
-    for sized in _sizes(score):
-        begin = {**base.solution.values, **sized}
-        tried.append((cost_at(observations, structure, nominal, metric_, begin,
-                              {**own, **sized}), begin, {**own, **sized}))
-    _, begin, sizes = min(tried, key=lambda one: one[0])
-    return fit_structure(observations, structure, nominal, metric_, begin, sizes, steps, base,
+    tried = [(cost(sized), sized) for sized in _sizes(score)]
+    least, sized = min(tried, key=lambda one: one[0])
+    for other in _others(score.signature.candidate, sized):
+        # One number after the other: a limit above all commands has no slope to follow.
+        again = cost(mixed := {**sized, **other})
+        if again < least:
+            least, sized = again, mixed
+    return fit_structure(observations, structure, nominal, metric_,
+                         {**base.solution.values, **sized}, {**own, **sized}, steps, base,
                          polish=False)

@@ -26,9 +26,9 @@ UNSTABLE = (0.35, 0.45)
 #: The same of effects whose state nobody sees: where in its play an idling gear lies when a
 #: crossing begins differs from stretch to stretch.
 UNSEEN = {'gear_backlash': 0.6}
-#: A further effect that explains at least this share of the unexplained energy may lose more over
-#: held-out blocks: up to the second number.
-HALF, UNSTABLE_HALF = 0.5, 0.5
+#: A further effect with at least such a gain [nats] and share of the unexplained energy may lose
+#: more over held-out blocks: up to the third number.
+FURTHER_UNSTABLE = ((0.0, 0.5, 0.5), (1000.0, 0.15, 0.45))
 #: Least share of the unexplained energy that a change between recordings must explain: with a
 #: gain above the first and the second number of nats that follow.
 CHANGE_SHARE = (0.035, 0.025)
@@ -38,6 +38,12 @@ CHANGE_GAIN = (80.0, 250.0)
 FURTHER_CHANGE = ((80.0, 0.5, 0.45), (400.0, 0.2, 0.4), (180.0, 0.08, 0.1), (500.0, 0.03, 0.05))
 #: Share by which an effect that scales all that the ground does must be better than others.
 SWEEPING = 0.15
+#: What an effect must relieve the recalibration of, and gain on held-out blocks with that, to be
+#: adopted however small its gain: numbers that all had to leave their tolerance a little without
+#: it hide it well [nats].
+RELIEF, RELIEVED = 4.0, 18.0
+#: Most that held-out blocks may gain, as a multiple of what all data do, and beyond it [nats].
+CREDIBLE = (2.0, 20.0)
 #: What a late effect must gain more than the same one without an onset: nats and share.
 LATER = (12.0, 0.15)
 
@@ -56,6 +62,8 @@ class Rival:
         Drop of the half sum of squares against the round's base, all data [nats].
     held_out : float
         The same on blocks that were not fitted [nats].
+    relief : float
+        By how much the recalibration leaves its tolerances less than without the effect [nats].
     """
 
     effect: Effect
@@ -63,6 +71,26 @@ class Rival:
     fit: Fit
     gain: float
     held_out: float
+    relief: float = 0.0
+
+
+def most_credible(gain: float) -> float:
+    """
+    Return the largest held-out gain that is one.
+
+    Where a number of the base shows in few blocks, leaving these out costs the base much, and
+    whatever shares that burden seems to gain what it does not explain.
+
+    Parameters
+    ----------
+    gain : float
+        Of the same effect on all data, relief of the recalibration included [nats].
+
+    Returns
+    -------
+    float
+    """
+    return CREDIBLE[0] * max(gain, 0.0) + CREDIBLE[1]
 
 
 def rank(rival: Rival) -> float:
@@ -103,7 +131,12 @@ def adopts(best: Rival, share: float, unstable: float, rest: float, number: int,
     if all(found[p.name] == found.entry(p.name).lower == 0.0
            for p in best.effect.parameters() if not p.fixed):
         return False
-    unsteady = UNSTABLE_HALF if number > 0 and share > HALF else UNSTABLE[change]
+    if not change and number == 0 and unstable < UNSTABLE[0] and (
+            best.relief > RELIEF and best.held_out + best.relief > RELIEVED):
+        return True
+    unsteady = max([UNSTABLE[change], *(
+        most for gain, least, most in FURTHER_UNSTABLE
+        if number > 0 and best.held_out > gain and share > least)])
     if best.held_out < LEAST_GAIN[late] or unstable > UNSEEN.get(best.effect.id, unsteady):
         return False
     if change and number > 0:

@@ -8,11 +8,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.candidates import Candidate
-from lg_husky_sim.diagnosis.evidence import energy, held_out_cost, instability
+from lg_husky_sim.diagnosis.evidence import energy, held_out_cost, instability, strain
 from lg_husky_sim.diagnosis.fits import at_nominal, Fit, fit_structure, shared_metric
 from lg_husky_sim.diagnosis.onsets import Onsets
 from lg_husky_sim.diagnosis.refits import look, Looked, Refit, run_refit
-from lg_husky_sim.diagnosis.rivals import adopts, LATER, LEAST_GAIN, rank, Rival, UNSTABLE
+from lg_husky_sim.diagnosis.rivals import (
+    adopts,
+    LEAST_GAIN,
+    most_credible,
+    rank,
+    Rival,
+    UNSTABLE,
+)
 from lg_husky_sim.diagnosis.screening import (
     Projector,
     scan,
@@ -20,6 +27,7 @@ from lg_husky_sim.diagnosis.screening import (
     Signature,
     without_columns,
 )
+from lg_husky_sim.diagnosis.shortlist import always, changes, shortlist
 from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
@@ -35,8 +43,10 @@ POLISHED = 5
 OF_CHANGES = (9, 6)
 #: Most steps of such a refit: one that has not converged makes the wrong rival win.
 POLISH = 16
-#: How much more a change must explain after it than in any recording before it.
-PLACEBO = 2.0
+#: Most steps of the last refit, under the metric that judges; how far from the best those that
+#: take part may be: nats, and part of its gain.
+SETTLE = 4
+CONTEND = (100.0, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +127,12 @@ def play_round(observations: Observations, base: Fit, number: int, nominal: Para
         scores, broad = (screen(observations, base, one, signatures, masks if late else ())
                          for one in (common, common.uncorrelated))
     most, finished = OF_CHANGES if only_late else (SERIOUS, POLISHED)
-    serious = _serious(scores, most)
+    serious = shortlist(scores, most)
     chosen = {(s.signature.candidate.label, s.onset is None) for s in serious}
-    serious += [s for s in _serious(broad, most // 2)
+    serious += [s for s in shortlist(broad, most // 2)
                 if (s.signature.candidate.label, s.onset is None) not in chosen]
+    if not only_late:
+        serious += always(serious, broad)
     nominal_fit = None if only_late else at_nominal(observations, base, nominal)
     starts = [near for near in (base, nominal_fit) if near is not None]
     tasks = [(k, near) for k in range(len(serious)) for near in starts]
@@ -156,13 +168,15 @@ def play_round(observations: Observations, base: Fit, number: int, nominal: Para
     closest = min(usable, key=lambda pair: left_by(observations, pair[1], final))[1]
     if closest is not best:
         final = shared_metric(observations, closest, [])
+    rebased, usable = settled(observations, base, nominal, rebased, usable, final, workers)
     cost_base = held_out_cost(observations, rebased, final, folds)
     rivals = []
     for score, fit in usable:
         cost = held_out_cost(observations, fit, final, folds)
         gain = left_by(observations, rebased, final) - left_by(observations, fit, final)
-        rivals.append(Rival(fit.structure.effects[-1], score.onset, fit, gain,
-                            float(np.sum(cost_base - cost))))
+        relief = strain(rebased) - strain(fit)
+        held_out = min(float(np.sum(cost_base - cost)), most_credible(gain + max(relief, 0.0)))
+        rivals.append(Rival(fit.structure.effects[-1], score.onset, fit, gain, held_out, relief))
     rivals.sort(key=lambda r: -rank(r))
     before = energy(observations, rebased, final)
     after = energy(observations, rivals[0].fit, final)
@@ -228,51 +242,43 @@ def rescued(observations: Observations, base: Fit, nominal: Parameters,
     return [(score, better.get(i, fit)) for i, (score, fit) in enumerate(usable)]
 
 
-def changes(scores: Sequence[Score], whole: Onsets) -> list[Score]:
+def settled(observations: Observations, base: Fit, nominal: Parameters, rebased: Fit,
+            usable: Sequence[tuple[Score, Fit]], metric_: Metric, workers: Workers
+            ) -> tuple[Fit, list[tuple[Score, Fit]]]:
     """
-    Choose the onset of each change between recordings: a moment inside one must clearly pay.
+    Refit the best under the metric that judges: under another, optima differ by tens of nats.
 
     Parameters
     ----------
-    scores : sequence of Score
-        With all onsets of each candidate.
-    whole : Onsets
-        The beginning of the later recordings.
+    observations : Observations
+    base : Fit
+        Of the round.
+    nominal : Parameters
+    rebased : Fit
+        Without any of the candidates.
+    usable : sequence of (Score, Fit)
+    metric_ : Metric
+        That judges.
+    workers : Workers
 
     Returns
     -------
-    list of Score
-        One of each candidate, best first.
+    Fit
+        The base.
+    list of (Score, Fit)
+        In the same order.
     """
-    given = {onset for onset, _ in whole.onsets}
-    late = beyond_placebo([s for s in scores if s.onset is not None])
-    best = {s.signature.candidate.label: s for s in late if s.onset in given}
-    for score in late:
-        label = score.signature.candidate.label
-        if score.onset not in given and (label not in best or score.gain > (
-                LATER[0] + (1.0 + LATER[1]) * best[label].gain)):
-            best[label] = score
-    return sorted(best.values(), key=lambda s: -s.gain)
-
-
-def beyond_placebo(scores: Sequence[Score]) -> list[Score]:
-    """
-    Keep the changes that explain more than they would if made elsewhere.
-
-    Where a model is wrong in the same way before and after a change, an effect that is switched
-    on in any one recording explains something; only one that explains several times as much
-    where the change was is a change.
-
-    Parameters
-    ----------
-    scores : sequence of Score
-        Each with its ``placebo``.
-
-    Returns
-    -------
-    list of Score
-    """
-    return [s for s in scores if s.gain > PLACEBO * s.placebo + LEAST_GAIN[0]]
+    again = fit_structure(observations, base.structure, nominal, metric_,
+                          rebased.solution.values, base.parameters, SETTLE)
+    left = [left_by(observations, fit, metric_) for _, fit in usable]
+    lead = left_by(observations, rebased, metric_) - min(left)
+    near = [i for i, one in enumerate(left)
+            if one - min(left) < max(CONTEND[0], CONTEND[1] * lead)]
+    fits = workers.map(run_refit, [
+        Refit(observations, base, nominal, without_columns(score), metric_, SETTLE, fit)
+        for score, fit in (usable[i] for i in near)])
+    better = {i: fit for i, fit in zip(near, fits, strict=True) if fit is not None}
+    return again or rebased, [(score, better.get(i, fit)) for i, (score, fit) in enumerate(usable)]
 
 
 def screen(observations: Observations, base: Fit, metric_: Metric,
@@ -300,22 +306,3 @@ def screen(observations: Observations, base: Fit, metric_: Metric,
     projector = Projector(observations, metric_, observations.measured - base.solution.predicted,
                           base.solution.jacobian, deviations, pull)
     return scan(projector, signatures, masks)
-
-
-def _serious(scores: Sequence[Score], most: int) -> list[Score]:
-    # The best few, at most two variants of one effect; an onset only where it clearly helps.
-    plain = {s.signature.candidate.label: s.gain for s in scores if s.onset is None}
-    chosen: list[Score] = []
-    counts: dict[str, int] = {}
-    for score in scores:
-        name = score.signature.candidate.effect.id
-        without = plain.get(score.signature.candidate.label, 0.0)
-        if score.onset is not None and score.gain < 1.1 * without + 15.0:
-            continue
-        if counts.get(name, 0) >= 2:
-            continue
-        counts[name] = counts.get(name, 0) + 1
-        chosen.append(score)
-        if len(chosen) >= most:
-            break
-    return chosen

@@ -19,7 +19,7 @@ from functools import partial
 from lg_husky_sim.diagnosis.candidates import candidates, changed_candidates
 from lg_husky_sim.diagnosis.evidence import folds_of
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate
-from lg_husky_sim.diagnosis.onset_placing import begun_late, refined_onset
+from lg_husky_sim.diagnosis.onset_placing import begun_late, refined_onsets
 from lg_husky_sim.diagnosis.onsets import change_onsets, Onsets, place_onsets, time_onsets
 from lg_husky_sim.diagnosis.revision import reconsidered, without_idle
 from lg_husky_sim.diagnosis.rounds import play_round, Round
@@ -225,10 +225,9 @@ def with_better_onset(observations: Observations, fit: Fit, nominal: Parameters,
     """
     if fit.structure.onset is None or fit.structure.onset == change:
         return fit
-    onset = refined_onset(observations, fit, metric_, change)
-    if onset is None:
-        return fit
     sizes = {**fit.parameters, **fit.solution.values}
-    again = fit_structure(observations, replace(fit.structure, onset=onset), nominal, metric_,
-                          fit.solution.values, sizes, 3)
-    return fit if again is None else again
+    tried = [fit_structure(observations, replace(fit.structure, onset=onset), nominal, metric_,
+                           fit.solution.values, sizes, 3)
+             for onset in refined_onsets(observations, fit, metric_, change)]
+    return min((again for again in tried if again is not None),
+               key=lambda again: again.solution.cost, default=fit)

@@ -40,6 +40,8 @@ _PERIODIC = ('heading', 'angle', 'angle_left', 'angle_right')
 #: Descriptions of a change that are compared with earlier recordings, from which gain on [nats],
 #: and by how much they must explain more than in earlier ones, and than if always there.
 FIRST, LEAST, PLACEBO, ALWAYS = 3, 85.0, 2.0, 1.5
+#: Descriptions that are confirmed at most, and from which gain on [nats].
+ASKED, WORTH = 6, 40.0
 #: Steps of a refit with a description.
 STEPS = 16
 KNOTS = tuple(f'knot_{i}' for i in range(1, 10))
@@ -64,6 +66,10 @@ class Description:
         First and last knot [unit of the argument].
     onset : Onset or None
         Where it begins, if a change between recordings was asked for.
+    confirmed : float
+        Held-out gain under a metric that takes all but this description for noise [nats]: what a
+        rough floor shakes slowly looks like many smooth functions, and is none of them. 0 where
+        it is not counted.
     """
 
     effect: Effect
@@ -72,6 +78,7 @@ class Description:
     knots: tuple[float, ...]
     range: tuple[float, float]  # noqa: A003
     onset: Onset | None = None
+    confirmed: float = 0.0
 
     @property
     def argument(self) -> str:
@@ -236,6 +243,11 @@ class Unnamed:
         """Held-out gain of the best description [nats]; 0 without one."""
         return self.descriptions[0].held_out if self.descriptions else 0.0
 
+    @property
+    def confirmed(self) -> float:
+        """Largest confirmed gain of a description [nats]; 0 without one."""
+        return max((d.confirmed for d in self.descriptions), default=0.0)
+
 
 def look_for_unnamed(observations: Observations, fit: Fit, change: Onset | None = None
                      ) -> Unnamed:
@@ -267,15 +279,23 @@ def look_for_unnamed(observations: Observations, fit: Fit, change: Onset | None 
     pull = np.array([(u.centre - u.varied(fit.solution.values[u.name])) / u.deviation
                      for u in unknowns])
     residual = observations.measured - fit.solution.predicted
-    projector = Projector(observations, metric, residual, fit.solution.jacobian, deviations,
-                          pull)
     jacobian, folds = fit.solution.jacobian, folds_of(observations)
+    projector = Projector(observations, metric, residual, jacobian, deviations, pull)
 
-    def ranking(shown: Sequence[Signature]) -> tuple[Description, ...]:
-        return describe(observations, shown, projector, residual, jacobian, folds, FOLDS)
+    def ranking(shown: Sequence[Signature], under: Projector = projector
+                ) -> tuple[Description, ...]:
+        return describe(observations, shown, under, residual, jacobian, folds, FOLDS)
     ranked = ranking(signatures)
     if change is not None:
         ranked = beyond_placebo(observations, ranked, whole, change, ranking)
+    else:
+        by_effect = {s.candidate.effect: s for s in signatures}
+        for i, one in enumerate(d for d in ranked[:ASKED] if d.held_out > WORTH):
+            own = by_effect[one.effect]
+            under = Projector(observations, shared_metric(observations, fit, [own]), residual,
+                              jacobian, deviations, pull)
+            confirmed = ranking([own], under)[0].held_out
+            ranked = (*ranked[:i], replace(one, confirmed=confirmed), *ranked[i + 1:])
     left = (residual - jacobian @ projector.recalibrated(residual)) * metric.scale
     return Unnamed(ranked, float(np.sum(np.minimum(left ** 2, 1e6))),
                    int(np.count_nonzero(metric.scale)), metric)

@@ -7,9 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis import onset_placing
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.fits import first_metric, Fit, fit_structure
-from lg_husky_sim.diagnosis.onset_placing import begun_late, refined_onset
+from lg_husky_sim.diagnosis.onset_placing import begun_late, refined_onsets
 from lg_husky_sim.diagnosis.onsets import change_onsets
 from lg_husky_sim.diagnosis.screening import Projector
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
@@ -120,11 +121,32 @@ def test_the_place_is_found_finely(data: Observations) -> None:
     metric = first_metric(exact, seen)
     begun = fit_structure(exact, start, fit.parameters, metric, values, values, 0, polish=False)
     assert begun is not None
-    better = refined_onset(exact, begun, metric, change(exact))
-    assert better is not None
+    better, *_ = refined_onsets(exact, begun, metric, change(exact))
     assert better.kind is OnsetKind.PLACE_ABOVE
     assert better.recording == 'after0'
     assert better.value == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_valley_between_coarse_onsets_is_looked_into(
+        data: Observations, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wide valley at 9 s is found coarsely, a deeper and narrow one at 4.2 s only inside."""
+    fit, place = sloped(0.0)
+    onset = Onset(OnsetKind.TIME, 9.0, place.recording)
+    fit = replace(fit, structure=replace(fit.structure, onset=onset))
+
+    def cost(*given: object) -> float:
+        at = given[-1]
+        assert isinstance(at, Onset)
+        if at.recording != place.recording:
+            return 2000.0
+        wide, narrow = 100.0 + 400.0 * abs(at.value - 9.0), 1000.0 * abs(at.value - 4.2)
+        return min(wide, narrow, 500.0 + abs(at.value - 4.2))
+    monkeypatch.setattr(onset_placing, '_cost', cost)
+    metric = first_metric(data, data.measured)
+    first, second = refined_onsets(data, fit, metric, change(data))
+    assert first.value == pytest.approx(4.2, abs=0.06)
+    assert second.value == pytest.approx(9.0, abs=0.06)
+    assert {first.recording, second.recording} == {place.recording}
 
 
 @pytest.mark.parametrize('begins', [None, 6.0])

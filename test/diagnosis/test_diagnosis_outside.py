@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 import re
 
 from lg_husky_sim.diagnosis.candidates import effect_entries
@@ -152,9 +153,13 @@ def test_guise_leaves_much_beside_what_was_named(
     search, gained = named(record, effect), 300.0
     left = tuple(sorted((Description(Effect(name, shape=shape, side='both' if name in (
         'smooth_torque', 'smooth_voltage') else 'none'), ratio * gained, 0.0, (0.0,) * 9,
-        (0.0, 1.0)) for (name, shape), ratio in efforts.items()), key=lambda d: -d.held_out))
+        (0.0, 1.0), confirmed=0.2 * gained) for (name, shape), ratio in efforts.items()),
+        key=lambda d: -d.held_out))
     unnamed = Unnamed(left, 1.0, 1, search.rounds[0].metric)
     assert is_guise(search, unnamed) is guise
+    # What only a crowd of smooth efforts explains together says nothing.
+    alone = tuple(replace(d, confirmed=15.0) for d in left)
+    assert not is_guise(search, replace(unnamed, descriptions=alone))
 
 
 @pytest.mark.parametrize(('gain', 'share', 'unstable', 'number', 'change', 'adopted'), [
@@ -166,7 +171,8 @@ def test_guise_leaves_much_beside_what_was_named(
     (90.0, 0.6, 0.4, 1, True, True), (90.0, 0.3, 0.01, 1, True, False),
     (450.0, 0.25, 0.38, 1, True, True), (450.0, 0.25, 0.45, 1, True, False),
     (300.0, 0.6, 0.45, 1, False, True), (300.0, 0.4, 0.45, 1, False, False),
-    (300.0, 0.6, 0.45, 0, False, False)])
+    (300.0, 0.6, 0.45, 0, False, False), (1500.0, 0.17, 0.4, 2, False, True),
+    (1500.0, 0.17, 0.5, 2, False, False), (1500.0, 0.1, 0.4, 2, False, False)])
 def test_effect_is_adopted_for_gain_share_and_steadiness(
         gain: float, share: float, unstable: float, number: int, change: bool, adopted: bool,
         fitted: Callable[[Effect], Fit]) -> None:
