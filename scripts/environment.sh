@@ -14,6 +14,11 @@ fail() {
     exit 1
 }
 
+room_at() {
+    # room_at FOLDER: what is free there [MB].
+    df -Pm "$1" | awk 'NR == 2 { print $4 }'
+}
+
 ros_is_sourced() {
     [ -n "${AMENT_PREFIX_PATH:-}" ] && [ -n "${ROS_DISTRO:-}" ]
 }
@@ -69,10 +74,13 @@ show_progress() {
 
 install_project() {
     # install_project LOG [OPTION...]: what is needed, from the network unless options say no.
+    # Modules are compiled when first imported: most never are, and it takes half the time and a
+    # quarter of the room.
     local log=$1
     shift
     PIP_RETRIES=${PIP_RETRIES:-2} PIP_DISABLE_PIP_VERSION_CHECK=1 "$venv/bin/python" -m pip \
-        install --progress-bar off "${constraints[@]}" "$@" --editable "${root}[${extra}]" 2>&1 |
+        install --no-compile --progress-bar off "${constraints[@]}" "$@" \
+        --editable "${root}[${extra}]" 2>&1 |
         tee "$log" | show_progress
     grep -q '^Successfully installed .*lg[-_]husky[-_]sim' "$log"
 }
@@ -110,7 +118,7 @@ not of our making; remove it, or name another folder in LG_HUSKY_VENV"
     if [ ! -x "$venv/bin/python" ]; then
         "$python" -c 'import ensurepip, venv' 2>/dev/null ||
             fail "$python has no venv module; on Debian or Ubuntu: sudo apt install python3-venv"
-        echo "setting up $venv with $("$python" -V 2>&1) (once; a few minutes, some 600 MB)" >&2
+        echo "setting up $venv with $("$python" -V 2>&1) (once; a minute or two, some 750 MB)" >&2
         mkdir -p "$venv" && touch "$venv/.lg_husky_made"
         "$python" -m venv "${options[@]}" "$venv" || fail "could not make $venv"
     else
@@ -122,6 +130,10 @@ not of our making; remove it, or name another folder in LG_HUSKY_VENV"
         if grep -qiE 'NewConnectionError|name resolution|Network is unreachable|Connection (refused|timed out|reset)|ReadTimeout|ProxyError|Name or service not known|Max retries' "$log"; then
             fail "there is no network to install from: connect, or set LG_HUSKY_VENV to an \
 environment that has everything (full log: $log)"
+        fi
+        if grep -q 'No space left on device' "$log"; then
+            fail "no room for $venv: it needs 1 GB, $(room_at "$venv") MB are free there and \
+$(room_at "${TMPDIR:-/tmp}") MB in ${TMPDIR:-/tmp}; free some, or name another folder in LG_HUSKY_VENV"
         fi
         fail "installing failed; full log: $log"
     }
