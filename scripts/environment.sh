@@ -74,12 +74,10 @@ show_progress() {
 
 install_project() {
     # install_project LOG [OPTION...]: what is needed, from the network unless options say no.
-    # Modules are compiled when first imported: most never are, and it takes half the time and a
-    # quarter of the room.
     local log=$1
     shift
     PIP_RETRIES=${PIP_RETRIES:-2} PIP_DISABLE_PIP_VERSION_CHECK=1 "$venv/bin/python" -m pip \
-        install --no-compile --progress-bar off "${constraints[@]}" "$@" \
+        install --progress-bar off "${constraints[@]}" "$@" \
         --editable "${root}[${extra}]" 2>&1 |
         tee "$log" | show_progress
     grep -q '^Successfully installed .*lg[-_]husky[-_]sim' "$log"
@@ -118,7 +116,7 @@ not of our making; remove it, or name another folder in LG_HUSKY_VENV"
     if [ ! -x "$venv/bin/python" ]; then
         "$python" -c 'import ensurepip, venv' 2>/dev/null ||
             fail "$python has no venv module; on Debian or Ubuntu: sudo apt install python3-venv"
-        echo "setting up $venv with $("$python" -V 2>&1) (once; a minute or two, some 750 MB)" >&2
+        echo "setting up $venv with $("$python" -V 2>&1) (once; a few minutes, some 950 MB)" >&2
         mkdir -p "$venv" && touch "$venv/.lg_husky_made"
         "$python" -m venv "${options[@]}" "$venv" || fail "could not make $venv"
     else
@@ -132,7 +130,7 @@ not of our making; remove it, or name another folder in LG_HUSKY_VENV"
 environment that has everything (full log: $log)"
         fi
         if grep -q 'No space left on device' "$log"; then
-            fail "no room for $venv: it needs 1 GB, $(room_at "$venv") MB are free there and \
+            fail "no room for $venv: it needs 1.3 GB, $(room_at "$venv") MB are free there and \
 $(room_at "${TMPDIR:-/tmp}") MB in ${TMPDIR:-/tmp}; free some, or name another folder in LG_HUSKY_VENV"
         fi
         fail "installing failed; full log: $log"
