@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from lg_husky_sim.diagnosis import judge
 from lg_husky_sim.diagnosis.confidence import estimates
 from lg_husky_sim.diagnosis.doubts import is_guise
+from lg_husky_sim.diagnosis.events import event_words, what_happens
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
@@ -227,6 +228,9 @@ def _notes(found: Search, verdict: Verdict) -> tuple[str, ...]:
     if bound:
         notes.append('at the edge of what a recalibration may use up: ' + ', '.join(bound))
     if verdict is Verdict.KNOWN:
+        seen = what_happens(found)
+        if seen:
+            notes.append(f'what was named is not the whole of it: {event_words(seen)}')
         more = against_before(found, found.final, False)
         if more > MORE:
             notes.append(f'the later recordings are still {more:.1f} times as far from the model '

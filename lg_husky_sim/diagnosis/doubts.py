@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 
+from lg_husky_sim.diagnosis.events import remain
 from lg_husky_sim.diagnosis.evidence import FOLDS, folds_of
 from lg_husky_sim.diagnosis.fits import Fit, metric_beside
 from lg_husky_sim.diagnosis.misfit import is_far
@@ -89,7 +90,7 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
     if gained < SLIGHT_GAIN and named[0].instability > SLIGHT_UNSTABLE:
         return True
     left = math.prod(1.0 - min(max(r.share, 0.0), 1.0) for r in named)
-    if 1.0 - left < FAINT and is_far(search):
+    if (1.0 - left < FAINT and is_far(search)) or remain(search):
         return True
     effects = [r.rivals[0].effect for r in named]
     places = {effect.kind.subsystem for effect in effects}

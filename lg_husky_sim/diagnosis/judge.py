@@ -10,6 +10,7 @@ from dataclasses import replace
 from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
 from lg_husky_sim.diagnosis.doubts import belief, further_gain, reading_gain
+from lg_husky_sim.diagnosis.events import event_words, place_of, SHOWS, what_happens
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.misfit import against_before, beyond_chance, farthest, is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
@@ -30,19 +31,20 @@ CERTAIN, FOLLOWED = 60.0, 30.0
 #: Held-out gain of an effect from which something is missing [nats]; then of a smooth description,
 #: and the share of the unexplained that it must explain then.
 EVIDENT, SMOOTH, SMOOTH_SHARE = 85.0, 110.0, 0.05
+#: Held-out gain of an effect from which something has changed between recordings, where much else
+#: differs a little [nats].
+CERTAIN_CHANGE = 250.0
 #: Confirmed gain of a smooth description that is enough alone [nats]. A moment must have it: a
 #: rough floor turns a robot more than it does anything else.
 CONFIRMED = 25.0
 #: Held-out gain from which a smooth description is put into the model, and at which something
 #: missing is even with nothing, where it is not known [nats].
 DESCRIBED = 45.0
-#: The same for a change between recordings, where much else differs a little [nats].
-CERTAIN_CHANGE = 250.0
-#: The same of a smooth effort that begins with the later recordings [nats], and how much farther
-#: these must then be from the model than the earlier ones.
+#: Held-out gain of a smooth effort that begins with the later recordings from which something has
+#: changed [nats], and how much farther from the model than the earlier ones these must be then.
 SMOOTH_CHANGE, SMOOTH_FARTHER = 1000.0, 1.6
-#: The same before anything is refitted: signatures of the catalogue explain it then, and none of
-#: their refits does [nats].
+#: Gain before anything is refitted from which something has changed [nats]: signatures of the
+#: catalogue explain it then, and none of their refits does.
 SCREENED_CHANGE = 500.0
 #: Held-out gain at which nothing missing is even with something, and its width [nats]; then of a
 #: change between recordings.
@@ -53,10 +55,6 @@ NO_GRIP = 0.015
 #: A rival within this share of the winner's held-out gain, or this many nats, is as good.
 NEAR_SHARE = 0.06
 NEAR_NATS = 10.0
-#: Part of the robot that a channel tells of, where nothing else does.
-SHOWS = {'wheel_left': Subsystem.DRIVETRAIN, 'wheel_right': Subsystem.DRIVETRAIN,
-         'yaw_rate': Subsystem.ROTATION, 'turn': Subsystem.ROTATION,
-         'advance': Subsystem.TRANSLATION}
 #: Arguments of a smooth effort, in words.
 WHEEL_ANGLES = {'angle': "the wheel's angle", 'angle_left': "the left wheel's angle",
                 'angle_right': "the right wheel's angle"}
@@ -194,9 +192,9 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     -------
     bool
         Whether an effect or a description explains more than chance, however little of it, or
-        the model is so far from the data that something must be missing.
+        the model is so far from the data, always or now and then, that something must be missing.
     """
-    if is_far(search):
+    if is_far(search) or what_happens(search):
         return True
     first = search.rounds[0]
     screened = first.scores[0].gain if first.scores else 0.0
@@ -301,7 +299,7 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
     Description or None
         The description to put into the model, where it predicts held-out data better.
     """
-    first = search.rounds[0]
+    first, seen = search.rounds[0], what_happens(search)
     rivals = _rivals(first, None)
     near = max(first.rivals, key=lambda r: r.held_out, default=None)
     best = unnamed.descriptions[0] if unnamed.descriptions else None
@@ -316,10 +314,11 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
                       'its name.')
         gain = best.held_out
     elif near is None and not first.scores:
-        channel, _, _ = farthest(search)
-        return Finding('unknown', 'none', SHOWS[channel].value, (), 'not determined', None, (),
+        place = place_of(seen) if seen else SHOWS[farthest(search)[0]]
+        far = event_words(seen) if seen else distance_words(search)
+        return Finding('unknown', 'none', place.value, (), 'not determined', None, (),
                        0.0, 0.0, 0.0, (), 'Something is missing that is not in the catalogue, '
-                       f'and nothing in it comes near. {distance_words(search)}'), None
+                       f'and nothing in it comes near. {far}'), None
     else:
         effect = near.effect if near is not None else first.scores[0].signature.candidate.effect
         kind = effect.kind
@@ -329,10 +328,15 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
         words = (f'Something is missing that is not in the catalogue; the nearest entry, '
                  f'{effect.id}, explains {100.0 * max(first.share, 0.0):.1f} % of it, and '
                  f'{doubt}.')
-    if is_far(search):
+    place, elements, regime = kind.subsystem, kind.elements, 'not determined'
+    if seen:
+        place, regime = place_of(seen), 'now and then'
+        elements = elements if place is kind.subsystem else ()
+        words += f' {event_words(seen)}'
+    elif is_far(search):
         words += f' {distance_words(search)}'
-    return Finding('unknown', 'none', kind.subsystem.value, kind.elements, 'not determined',
-                   None, (), gain, p_value(gain, 9, len(candidates())), unnamed.share, rivals,
+    return Finding('unknown', 'none', place.value, elements, regime, None, (), gain,
+                   p_value(gain, 9, len(candidates())), unnamed.share, rivals,
                    words), best if described else None
 
 
@@ -359,7 +363,7 @@ def confidence(search: Search, verdict: Verdict, unnamed: Unnamed | None = None)
         return float(1.0 / (1.0 + np.exp((strongest - half) / width)))
     if verdict is Verdict.UNKNOWN:
         strongest = max(strongest, 0.0 if unnamed is None else unnamed.held_out)
-        far = 1.0 if is_far(search) else 0.0
+        far = 1.0 if is_far(search) or what_happens(search) else 0.0
         return float(max(1.0 / (1.0 + np.exp(-(strongest - DESCRIBED) / 15.0)), far) * 0.5 + 0.4)
     by_name: dict[str, float] = {}
     for rival in first.rivals:

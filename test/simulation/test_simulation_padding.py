@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
-from lg_husky_sim.husky.laws import CONTEXT, evaluate, MEMORY
+from lg_husky_sim.husky.laws import CONTEXT, evaluate, Law, MEMORY
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.simulation.discretise import discretise
 import numpy as np
@@ -28,4 +28,5 @@ def test_padding_reads_nothing_and_adds_nothing(robot: Maker, name: str) -> None
         z, memory, out = np.full(8, np.nan), np.full(MEMORY, np.nan), np.full(efforts, 7.0)
         evaluate(c, laws, coefficients, offsets, z, np.ones(CONTEXT), memory, out)
         np.testing.assert_array_equal(out[own:], 0.0)
-        assert not np.any(np.isin(laws[c, own:], (13, 14)))
+        remembering = (Law.HEATING, Law.BACKLASH)
+        assert not np.any(np.isin(laws[c, own:], remembering))

@@ -1,0 +1,119 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What happens now and then is noticed, placed in time, and given no name of the catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.events import event_words, moments, place_of, remain, what_happens
+from lg_husky_sim.diagnosis.fits import first_metric, fit_structure, recalibrate
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.search import Search
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind, Subsystem
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.identification.problem import observations
+from lg_husky_sim.recording import Recording, segments
+import pytest
+
+Steps = Sequence[tuple[float, float, float]]
+Record = Callable[..., Recording]
+#: Steps that come late, of those of the drives, and by how long [s].
+STALLS, HOLD = (2, 4, 7), 0.4
+
+
+@pytest.fixture(scope='module')
+def plant() -> Plant:
+    model = load_model()
+    return compile_model(model.structure).at(model.parameters)
+
+
+@pytest.fixture(scope='module')
+def stalled(record: Record, steps: Steps, plant: Plant) -> Callable[..., Recording]:
+    """Return a function that records a robot some of whose commands come late."""
+    def made(name: str, seed: int, late: Sequence[int] = STALLS) -> Recording:
+        moved = [list(step) for step in steps]
+        for k in late:
+            moved[k - 1][0] += HOLD
+            moved[k][0] -= HOLD
+        told, acted = (record(name, plant, rows, seed) for rows in (steps, moved))
+        return replace(acted, streams={**acted.streams, 'command': told.streams['command']})
+    return made
+
+
+def looked_at(recordings: Sequence[Recording], change: Onset | None = None) -> Search:
+    """Return a search that found nothing."""
+    model = load_model()
+    data = observations([s for r in recordings for s in segments(r)])
+    plain = recalibrate(data, model.structure, model.parameters)
+    return Search(data, plain, plain, (), model.parameters, change)
+
+
+def test_moments_are_found_where_they_are(stalled: Callable[..., Recording], steps: Steps
+                                          ) -> None:
+    found = what_happens(looked_at([stalled('rec', 1)]))
+    assert {'wheel_left', 'wheel_right'} <= set(found)
+    begins = [sum(step[0] for step in steps[:k]) for k in STALLS]
+    for name in ('wheel_left', 'wheel_right'):
+        one = found[name]
+        assert one.excess > 1.0
+        assert {recording for recording, _ in one.begins} == {'rec'}
+        for _, time in one.begins[:3]:
+            assert min(abs(time - begin) for begin in begins) < HOLD + 0.3
+    assert place_of(found) is Subsystem.COMMAND
+    words = event_words(found)
+    assert 'wheel leaves the model by up to' in words
+    assert ' s of rec' in words
+
+
+@pytest.mark.parametrize('late', [(), STALLS[:1]])
+def test_one_late_command_is_chance(stalled: Callable[..., Recording], late: tuple[int, ...]
+                                    ) -> None:
+    search = looked_at([stalled('rec', 1, late)])
+    assert not what_happens(search)
+    largest = max(one.excess for one in moments(search.observations, search.plain).values())
+    assert (largest > 0.05) == bool(late)
+
+
+def test_one_wheel_alone_is_its_drivetrain(stalled: Callable[..., Recording]) -> None:
+    found = what_happens(looked_at([stalled('rec', 1)]))
+    assert place_of({'wheel_left': found['wheel_left']}) is Subsystem.DRIVETRAIN
+    assert place_of({'yaw_rate': found['wheel_left']}) is Subsystem.ROTATION
+
+
+@pytest.mark.parametrize(('before', 'happens'), [((), True), (STALLS, False)])
+def test_what_happened_before_is_no_change(stalled: Callable[..., Recording],
+                                           before: tuple[int, ...], happens: bool) -> None:
+    recordings = [stalled('base', 1, before), stalled('rec', 2)]
+    search = looked_at(recordings, Onset(OnsetKind.TIME, 0.0, 'rec'))
+    assert bool(what_happens(search)) is happens
+
+
+def test_names_that_cure_the_moments_stand(record: Record, steps: Steps) -> None:
+    """A dead time leaves the model far off after each step; named, it leaves nothing."""
+    model, effect, sizes = load_model(), Effect('command_latency'), {'latency': 0.3}
+    late = compile_model(model.structure.with_effect(effect)).at(
+        model.parameters.with_entries(*effect_entries(effect, sizes)))
+    search = looked_at([record('rec', late, steps, 1)])
+    nominal = {name: model.parameters[name] for name in model.parameters}
+    named = fit_structure(
+        search.observations, model.structure.with_effect(effect), model.parameters,
+        first_metric(search.observations, search.plain.solution.predicted),
+        {**search.plain.solution.values, **nominal}, {**nominal, **sizes}, 12)
+    assert named is not None
+    assert what_happens(search)
+    assert remain(search)
+    assert not remain(replace(search, final=named))
+
+
+def test_stalling_commands_get_no_name(stalled: Callable[..., Recording]) -> None:
+    found = diagnose([stalled('rec', 1)], load_model(), lambda text, share: None).diagnosis
+    assert found.verdict is Verdict.UNKNOWN
+    (finding,) = found.findings
+    assert (finding.effect, finding.subsystem) == ('unknown', 'command')
+    assert 'moments' in finding.statement
