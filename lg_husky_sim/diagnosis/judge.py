@@ -198,7 +198,7 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
         return True
     first = search.rounds[0]
     screened = first.scores[0].gain if first.scores else 0.0
-    tried = max((r.held_out for r in first.rivals), default=0.0)
+    tried = max((r.evidence for r in first.rivals), default=0.0)
     if search.change is not None:
         return screened > SCREENED_CHANGE or (
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]) or (
@@ -359,6 +359,7 @@ def confidence(search: Search, verdict: Verdict, unnamed: Unnamed | None = None)
     first = search.rounds[0]
     strongest = max((r.held_out for r in first.rivals), default=0.0)
     if verdict is Verdict.NOTHING_MISSING:
+        strongest = max((r.evidence for r in first.rivals), default=0.0)
         half, width = SURE[search.change is not None]
         return float(1.0 / (1.0 + np.exp((strongest - half) / width)))
     if verdict is Verdict.UNKNOWN:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.husky.effects import Effect, Onset
@@ -44,6 +45,8 @@ SWEEPING = 0.15
 RELIEF, RELIEVED = 4.0, 18.0
 #: Most that held-out blocks may gain, as a multiple of what all data do, and beyond it [nats].
 CREDIBLE = (2.0, 20.0)
+#: Part of the gain that must be left beside jitter of the commands.
+KEPT = 0.5
 #: What a late effect must gain more than the same one without an onset: nats and share.
 LATER = (12.0, 0.15)
 
@@ -64,6 +67,8 @@ class Rival:
         The same on blocks that were not fitted [nats].
     relief : float
         By how much the recalibration leaves its tolerances less than without the effect [nats].
+    beside_jitter : float
+        The gain where every step of the command may come a little later by itself [nats].
     """
 
     effect: Effect
@@ -72,6 +77,12 @@ class Rival:
     gain: float
     held_out: float
     relief: float = 0.0
+    beside_jitter: float = math.inf
+
+    @property
+    def evidence(self) -> float:
+        """Held-out gain, if jitter of the commands does not explain most of it; else 0 [nats]."""
+        return self.held_out if self.beside_jitter > KEPT * self.gain else 0.0
 
 
 def most_credible(gain: float) -> float:
@@ -137,7 +148,8 @@ def adopts(best: Rival, share: float, unstable: float, rest: float, number: int,
     unsteady = max([UNSTABLE[change], *(
         most for gain, least, most in FURTHER_UNSTABLE
         if number > 0 and best.held_out > gain and share > least)])
-    if best.held_out < LEAST_GAIN[late] or unstable > UNSEEN.get(best.effect.id, unsteady):
+    if min(best.held_out, best.beside_jitter) < LEAST_GAIN[late] or (
+            unstable > UNSEEN.get(best.effect.id, unsteady)):
         return False
     if change and number > 0:
         return any(best.held_out > gain and share > least and unstable < most

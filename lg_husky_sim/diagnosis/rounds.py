@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 from lg_husky_sim.diagnosis.candidates import Candidate
 from lg_husky_sim.diagnosis.evidence import energy, held_out_cost, instability, strain
 from lg_husky_sim.diagnosis.fits import at_nominal, Fit, fit_structure, shared_metric
+from lg_husky_sim.diagnosis.jitter import gains_beside_jitter
 from lg_husky_sim.diagnosis.onsets import Onsets
 from lg_husky_sim.diagnosis.refits import look, Looked, Refit, run_refit
 from lg_husky_sim.diagnosis.rivals import (
@@ -170,13 +172,17 @@ def play_round(observations: Observations, base: Fit, number: int, nominal: Para
         final = shared_metric(observations, closest, [])
     rebased, usable = settled(observations, base, nominal, rebased, usable, final, workers)
     cost_base = held_out_cost(observations, rebased, final, folds)
+    # Before a change a good description is wanted; what jitters after it did so before, too.
+    kept = gains_beside_jitter(observations, rebased, [fit for _, fit in usable], final) if not (
+        only_late or eager) else [math.inf] * len(usable)
     rivals = []
-    for score, fit in usable:
+    for (score, fit), beside in zip(usable, kept, strict=True):
         cost = held_out_cost(observations, fit, final, folds)
         gain = left_by(observations, rebased, final) - left_by(observations, fit, final)
         relief = strain(rebased) - strain(fit)
         held_out = min(float(np.sum(cost_base - cost)), most_credible(gain + max(relief, 0.0)))
-        rivals.append(Rival(fit.structure.effects[-1], score.onset, fit, gain, held_out, relief))
+        rivals.append(Rival(fit.structure.effects[-1], score.onset, fit, gain, held_out, relief,
+                            beside))
     rivals.sort(key=lambda r: -rank(r))
     before = energy(observations, rebased, final)
     after = energy(observations, rivals[0].fit, final)
