@@ -40,6 +40,11 @@ BOTH = 0.25
 SHOWS = {'wheel_left': Subsystem.DRIVETRAIN, 'wheel_right': Subsystem.DRIVETRAIN,
          'yaw_rate': Subsystem.ROTATION, 'turn': Subsystem.ROTATION,
          'advance': Subsystem.TRANSLATION}
+#: Elements of the graph that a part begins with, where no law says more.
+ELEMENTS = {Subsystem.COMMAND: ('V_S1', 'V_S2'), Subsystem.ROTATION: ('J_H',),
+            Subsystem.TRANSLATION: ('M_H',)}
+#: Regime of such a finding.
+NOW_AND_THEN = 'now and then'
 
 
 @dataclass(frozen=True)
@@ -184,6 +189,15 @@ def place_of(found: Mapping[str, Moments]) -> Subsystem:
            for name in ('wheel_left', 'wheel_right')):
         return Subsystem.COMMAND
     return SHOWS[most]
+
+
+def elements_of(found: Mapping[str, Moments]) -> tuple[str, ...]:
+    """Return the elements of the graph that moments tell of."""
+    place = place_of(found)
+    if place is Subsystem.DRIVETRAIN:
+        left = max(found, key=lambda name: found[name].excess) == 'wheel_left'
+        return ('J_LW',) if left else ('J_RW',)
+    return ELEMENTS[place]
 
 
 def event_words(found: Mapping[str, Moments]) -> str:

@@ -10,7 +10,14 @@ from dataclasses import replace
 from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
 from lg_husky_sim.diagnosis.doubts import belief, further_gain, reading_gain
-from lg_husky_sim.diagnosis.events import event_words, place_of, SHOWS, what_happens
+from lg_husky_sim.diagnosis.events import (
+    elements_of,
+    event_words,
+    NOW_AND_THEN,
+    place_of,
+    SHOWS,
+    what_happens,
+)
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.misfit import against_before, beyond_chance, farthest, is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
@@ -313,12 +320,15 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
             words += (f' The nearest entry, {first.rivals[0].effect.id}, leaves too much to be '
                       'its name.')
         gain = best.held_out
+    elif seen and (near is None or near.held_out < DESCRIBED):
+        return Finding('unknown', 'none', place_of(seen).value, elements_of(seen), NOW_AND_THEN,
+                       None, (), 0.0, 0.0, 0.0, rivals, 'Something is missing that is not in the '
+                       f'catalogue, and nothing in it comes near. {event_words(seen)}'), None
     elif near is None and not first.scores:
-        place = place_of(seen) if seen else SHOWS[farthest(search)[0]]
-        far = event_words(seen) if seen else distance_words(search)
-        return Finding('unknown', 'none', place.value, (), 'not determined', None, (),
+        channel, _, _ = farthest(search)
+        return Finding('unknown', 'none', SHOWS[channel].value, (), 'not determined', None, (),
                        0.0, 0.0, 0.0, (), 'Something is missing that is not in the catalogue, '
-                       f'and nothing in it comes near. {far}'), None
+                       f'and nothing in it comes near. {distance_words(search)}'), None
     else:
         effect = near.effect if near is not None else first.scores[0].signature.candidate.effect
         kind = effect.kind
@@ -330,8 +340,7 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
                  f'{doubt}.')
     place, elements, regime = kind.subsystem, kind.elements, 'not determined'
     if seen:
-        place, regime = place_of(seen), 'now and then'
-        elements = elements if place is kind.subsystem else ()
+        place, elements, regime = place_of(seen), elements_of(seen), NOW_AND_THEN
         words += f' {event_words(seen)}'
     elif is_far(search):
         words += f' {distance_words(search)}'

@@ -6,10 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+import re
 
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.diagnose import diagnose
-from lg_husky_sim.diagnosis.events import event_words, moments, place_of, remain, what_happens
+from lg_husky_sim.diagnosis.events import (
+    elements_of,
+    event_words,
+    moments,
+    place_of,
+    remain,
+    what_happens,
+)
 from lg_husky_sim.diagnosis.fits import first_metric, fit_structure, recalibrate
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.search import Search
@@ -83,6 +91,7 @@ def test_one_late_command_is_chance(stalled: Callable[..., Recording], late: tup
 def test_one_wheel_alone_is_its_drivetrain(stalled: Callable[..., Recording]) -> None:
     found = what_happens(looked_at([stalled('rec', 1)]))
     assert place_of({'wheel_left': found['wheel_left']}) is Subsystem.DRIVETRAIN
+    assert elements_of({'wheel_left': found['wheel_left']}) == ('J_LW',)
     assert place_of({'yaw_rate': found['wheel_left']}) is Subsystem.ROTATION
 
 
@@ -116,4 +125,5 @@ def test_stalling_commands_get_no_name(stalled: Callable[..., Recording]) -> Non
     assert found.verdict is Verdict.UNKNOWN
     (finding,) = found.findings
     assert (finding.effect, finding.subsystem) == ('unknown', 'command')
-    assert 'moments' in finding.statement
+    assert finding.elements == ('V_S1', 'V_S2')
+    assert re.search(r'In \d+ moments the (left|right) wheel leaves the model', finding.statement)
