@@ -133,14 +133,9 @@ def what_happens(search: Search) -> dict[str, Moments]:
     dict of str to Moments
         Of its final fit; empty where nothing happens.
     """
-    observations, change = search.observations, search.change
-    later = before = None
-    if change is not None:
-        names = observations.recordings
-        border = names.index(change.recording)
-        later, before = names[border:], names[:border]
-    found = moments(observations, search.final, None, later)
-    usual = moments(observations, search.final, None, before) if before else {}
+    before, after = search.sides
+    found = moments(search.observations, search.final, None, after)
+    usual = moments(search.observations, search.final, None, before)
     return {name: one for name, one in found.items() if len(one.begins) >= TIMES
             and one.excess > MUCH + BEFORE * (usual[name].excess if name in usual else 0.0)}
 
@@ -162,10 +157,8 @@ def remain(search: Search) -> bool:
     between = math.prod(1.0 - min(max(r.share, 0.0), 1.0) for r in search.rounds if r.adopted)
     if not found or between < BETWEEN:
         return False
-    change, names = search.change, search.observations.recordings
-    later = None if change is None else names[names.index(change.recording):]
     plain = moments(search.observations, search.plain,
-                    {name: one.width for name, one in found.items()}, later)
+                    {name: one.width for name, one in found.items()}, search.sides[1])
     most = max(found, key=lambda name: found[name].excess)
     return found[most].excess > LEFT * plain[most].excess
 

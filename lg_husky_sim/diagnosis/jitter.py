@@ -133,6 +133,9 @@ def with_jitter(observations: Observations, fit: Fit) -> Observations:
         if number not in as_told:
             as_told[number] = Observations((observations.pieces[number],)).predict(plant, extra)
         moved, late = later(observations.pieces[number], step)
+        if late <= 0.0:
+            # Two commands with one stamp: neither can come later than the other.
+            continue
         change = Observations((moved,)).predict(plant, extra) - as_told[number]
         rows = [s for s in observations.slices if s.piece == number]
         columns[rows[0].first:rows[-1].last, k] = JITTER / late * change

@@ -85,14 +85,10 @@ def ratios(search: Search, fit: Fit, alike: bool) -> dict[str, float]:
     dict of str to float
         Ratio of the mean squares of each channel.
     """
-    change = search.change
-    if change is None:
+    if search.change is None:
         return {}
-    observations, metric_ = search.observations, search.rounds[-1].metric
-    names = observations.recordings
-    border = names.index(change.recording)
-    before, after = (mean_squares(observations, fit, metric_, part, alike)
-                     for part in (names[:border], names[border:]))
+    before, after = (mean_squares(search.observations, fit, search.rounds[-1].metric, part, alike)
+                     for part in search.sides)
     return {name: after[name] / max(before[name], NOISE) for name in after if name in before}
 
 

@@ -63,6 +63,13 @@ class Search:
     nominal: Parameters
     change: Onset | None = None
 
+    @property
+    def sides(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Names of the recordings before and after the change; without one, none and all."""
+        names = self.observations.recordings
+        border = 0 if self.change is None else names.index(self.change.recording)
+        return names[:border], names[border:]
+
 
 Progress = Callable[[str, float], None]
 

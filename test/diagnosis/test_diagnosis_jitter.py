@@ -91,6 +91,21 @@ def test_columns_are_what_a_late_step_changes(data: Observations, plant: Plant) 
     assert float(np.linalg.norm(common[:, 3] - change)) < 0.1 * float(np.linalg.norm(change))
 
 
+def test_commands_of_one_stamp_are_no_step_of_jitter(data: Observations) -> None:
+    """Neither can come later than the other; a drive with one command has no step at all."""
+    model, (piece,) = load_model(), data.pieces
+    sent, step = piece.commands, steps_of(data)[2]
+    times = np.array(sent.times)
+    times[step.last + 1] = times[step.last]
+    for commands, count in ((TimeSeries(times, sent.values, sent.names), len(steps_of(data))),
+                            (TimeSeries(times[:1], sent.values[:1], sent.names), 0)):
+        odd = Observations((replace(piece, commands=commands),))
+        fit = recalibrate(odd, model.structure, model.parameters)
+        metric = first_metric(odd, fit.solution.predicted)
+        assert len(steps_of(odd)) == count
+        assert gains_beside_jitter(odd, fit, [fit], metric) == [0.0]
+
+
 def test_a_late_step_gains_nothing_beside_jitter_and_a_slope_does(data: Observations) -> None:
     model = load_model()
     base = recalibrate(data, model.structure, model.parameters)
