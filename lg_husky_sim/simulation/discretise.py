@@ -14,6 +14,7 @@ from lg_husky_sim.husky.laws import Law, WIDTH
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.kernel import COMMAND, DELAY
+from lg_husky_sim.simulation.merging import merged
 import numpy as np
 from numpy.typing import NDArray
 
@@ -157,15 +158,16 @@ def discretise(plant: Plant, period: float, *, fine_pose: bool = True) -> Operat
     ParameterError
         If the command's latency is longer than :data:`kernel.DELAY` - 2 periods.
     """
-    efforts = max(s.laws.size for s in plant.sets)
-    arguments = max(s.h.shape[0] for s in plant.sets)
-    n = plant.sets[0].a.shape[0]
+    sets = tuple(merged(one) for one in plant.sets)
+    efforts = max(s.laws.size for s in sets)
+    arguments = max(s.h.shape[0] for s in sets)
+    n = sets[0].a.shape[0]
     substeps = 1 if efforts == 0 else max(1, math.ceil(period / LONGEST - 1e-9))
     step = period / substeps
     times, weights = _quadrature(step) if fine_pose else (np.zeros(0), np.zeros(0))
     size = n + 4
     stacks: list[list[NDArray[np.generic]]] = [[] for _ in range(12)]
-    for one in plant.sets:
+    for one in sets:
         a, b, g = _held(one)
         g = np.pad(g, ((0, 0), (0, efforts - g.shape[1])))
         whole = expm(_block(a, b, g, step) * step)[:size]
@@ -187,15 +189,15 @@ def discretise(plant: Plant, period: float, *, fine_pose: bool = True) -> Operat
         for stack, piece in zip(stacks, pieces, strict=True):
             stack.append(piece)
     rows_f = np.stack([np.ascontiguousarray(_padded(s.rows_f, (9, efforts)).T)
-                       for s in plant.sets])
-    nodes = np.zeros((len(plant.sets), size + 2 + 2 * efforts, 2 * times.size))
+                       for s in sets])
+    nodes = np.zeros((len(sets), size + 2 + 2 * efforts, 2 * times.size))
     if fine_pose:
-        for index, one in enumerate(plant.sets):
+        for index, one in enumerate(sets):
             a, b, g = _held(one)
             g = np.pad(g, ((0, 0), (0, efforts - g.shape[1])))
             nodes[index] = _nodes(one, a, b, g, step, times)
     onset = np.zeros(2)
-    if plant.onset is not None and len(plant.sets) > 1:
+    if plant.onset is not None and len(sets) > 1:
         onset[:] = _ONSETS[plant.onset.kind], plant.onset.value
     stacked = [np.stack(stack) for stack in stacks]
     assert stacked[0].shape[1] == COMMAND

@@ -10,6 +10,7 @@ from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.laws import CONTEXT, evaluate, Law, MEMORY
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.simulation.discretise import discretise
+from lg_husky_sim.simulation.merging import merged
 import numpy as np
 import pytest
 
@@ -24,7 +25,7 @@ def test_padding_reads_nothing_and_adds_nothing(robot: Maker, name: str) -> None
     _, _, _, *stacks = discretise(plant, 0.02).arguments
     laws, coefficients, offsets = (np.asarray(stack) for stack in stacks[7:10])
     for c, one in enumerate(plant.sets):
-        efforts, own = laws.shape[1], one.laws.size
+        efforts, own = laws.shape[1], merged(one).laws.size
         z, memory, out = np.full(8, np.nan), np.full(MEMORY, np.nan), np.full(efforts, 7.0)
         evaluate(c, laws, coefficients, offsets, z, np.ones(CONTEXT), memory, out)
         np.testing.assert_array_equal(out[own:], 0.0)
