@@ -15,7 +15,7 @@ from __future__ import annotations
 import enum
 import math
 
-from lg_husky_sim.jit import jit
+from lg_husky_sim.jit import jit_part
 from lg_husky_sim.signals import FloatArray
 
 #: Coefficients that a row can hold.
@@ -104,12 +104,12 @@ EXPRESSIONS = {
 SIGNALS = ('heading', 'angle', 'time', 'heat', 'in_play', 'table')
 
 
-@jit
+@jit_part
 def _clip(value: float, lower: float, upper: float) -> float:
     return max(lower, min(upper, value))
 
 
-@jit
+@jit_part
 def _table(coefficients: FloatArray, c: int, j: int, argument: float) -> float:
     knots = int(abs(coefficients[c, j, 3]))
     lower, upper = coefficients[c, j, 1], coefficients[c, j, 2]
@@ -131,7 +131,7 @@ def _table(coefficients: FloatArray, c: int, j: int, argument: float) -> float:
                  + coefficients[c, j, 5 + left] * share)
 
 
-@jit
+@jit_part
 def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int,
                 memory: FloatArray, time: float, step: float, ceiling: float) -> float:
     # Laws of the electrical side: what the driver adds to its own voltage.
@@ -163,7 +163,7 @@ def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int
         abs(rate) * step)))
 
 
-@jit
+@jit_part
 def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatArray,
              z: FloatArray, context: FloatArray, memory: FloatArray, out: FloatArray) -> None:
     """
@@ -225,7 +225,7 @@ def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatA
                                  coefficients[c, j, CEILING])
 
 
-@jit
+@jit_part
 def remember(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatArray,
              z: FloatArray, memory: FloatArray, step: float) -> None:
     """

@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 
 from lg_husky_sim.husky.laws import CONTEXT, evaluate, remember
-from lg_husky_sim.jit import jit
+from lg_husky_sim.jit import jit, jit_part
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -50,7 +50,7 @@ DELAY = 128
 COMMAND = 10
 
 
-@jit
+@jit_part
 def _shaped(s: FloatArray, base: int, forward: float, yaw: float, stages: FloatArray,
             chosen: int) -> tuple[float, float]:
     # Latency (linear between steps), then limits, then slew.
@@ -74,7 +74,7 @@ def _shaped(s: FloatArray, base: int, forward: float, yaw: float, stages: FloatA
     return forward, yaw
 
 
-@jit
+@jit_part
 def _multiply(matrices: FloatArray, c: int, first: int, vector: FloatArray, count: int,
               out: FloatArray) -> None:
     # out += operator @ vector[:count]; row first + j of the stored matrix is column j of it.
@@ -84,7 +84,7 @@ def _multiply(matrices: FloatArray, c: int, first: int, vector: FloatArray, coun
             out[i] += matrices[c, first + j, i] * value
 
 
-@jit
+@jit_part
 def _pose(s: FloatArray, n: int, start: FloatArray, end: FloatArray, nodes: FloatArray,
           weights: FloatArray) -> None:
     # Advance x and y over one sub-step; nodes hold v and heading change at the nodes.
@@ -173,6 +173,7 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
     row = np.zeros(9)
     memory = s[n + 7:n + 11]
     count = weights.size
+    direct = bool(np.any(k != 0.0))
     for step in range(commands.shape[0]):
         chosen = 0
         if onset[0] == 1.0 and s[n + 6] >= onset[1] - 0.5 * period:
@@ -194,7 +195,10 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
             for i in range(n4):
                 start[i] = s[i]
                 end[i] = 0.0
-            _multiply(phi, chosen, 0, start, n4, end)
+            # Angles, distance and heading are integrals: nothing else depends on them.
+            _multiply(phi, chosen, 0, start, n, end)
+            for i in range(n, n4):
+                end[i] += start[i]
             _multiply(gamma_u, chosen, 0, u, 2, end)
             if efforts > 0:
                 context[0] = s[n + 6]
@@ -206,13 +210,15 @@ def run(s: FloatArray, commands: FloatArray, out: FloatArray, period: float, sub
                 for i in range(z.size):
                     z[i] = 0.0
                 _multiply(h, chosen, 0, start, n, z)
-                _multiply(k, chosen, 0, u, 2, z)
+                if direct:
+                    _multiply(k, chosen, 0, u, 2, z)
                 evaluate(chosen, laws, coefficients, offsets, z, context, memory, f0)
                 _multiply(gamma_1, chosen, 0, f0, efforts, end)
                 for i in range(z.size):
                     z[i] = 0.0
                 _multiply(h, chosen, 0, end, n, z)
-                _multiply(k, chosen, 0, u, 2, z)
+                if direct:
+                    _multiply(k, chosen, 0, u, 2, z)
                 context[0] += period / substeps
                 context[1] = end[n + 3]
                 context[4] = end[n]
