@@ -71,7 +71,8 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
             flat[state.n:state.n + 2] = wheel
         run(flat, held[first:last], out[first + 1:last + 1],
             *simulator.operators.arguments)  # type: ignore[arg-type]
-        out[first + 1:last + 1, ANGLES] += ahead
+        for column, lead in zip(ANGLES, ahead.tolist(), strict=True):
+            out[first + 1:last + 1, column] += lead
     return out
 
 

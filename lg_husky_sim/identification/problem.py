@@ -28,6 +28,7 @@ from lg_husky_sim.identification.pieces import (
     SETTLE,
     UNITS,
 )
+from lg_husky_sim.identification.sampling import sample
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.kernel import COLUMNS
@@ -224,14 +225,6 @@ class Observations:
         return Observations(tuple(p for p, k in zip(self.pieces, keep, strict=True) if k))
 
 
-def _sample(column: FloatArray, start: float, times: FloatArray) -> FloatArray:
-    place = np.clip((times - start) / PERIOD, 0.0, column.size - 1.000001)
-    left = place.astype(np.int64)
-    share = place - left
-    sampled: FloatArray = column[left] * (1.0 - share) + column[left + 1] * share
-    return sampled
-
-
 def _observe(piece: Piece, plant: Plant, grid: FloatArray, extra: Mapping[str, float]
              ) -> FloatArray:
     rates = grid[:, _COLUMN['yaw_rate']]
@@ -280,21 +273,21 @@ def _seen(channel: Channel, piece: Piece, grid: FloatArray, angle: FloatArray,
         factor = sensors.encoder_left if name == 'wheel_left' else sensors.encoder_right
         angles = grid[:, _COLUMN[name.replace('wheel', 'angle')]]
         ends = channel.times - late
-        return factor * (_sample(angles, start, ends) - _sample(
+        return factor * (sample(angles, start, ends) - sample(
             angles, start, ends - ENCODER_WINDOW)) / ENCODER_WINDOW
     if name == 'yaw_rate':
         late = sensors.delay_imu + extra.get('delay_imu', 0.0)
-        rate = _sample(grid[:, _COLUMN[name]], start, channel.times - late)
+        rate = sample(grid[:, _COLUMN[name]], start, channel.times - late)
         return sensors.gyro_factor * rate + sensors.gyro_bias + extra.get('gyro_bias', 0.0)
     late = sensors.delay_pose + extra.get('delay_pose', 0.0)
     span = channel.times - channel.begins
-    turn = (_sample(angle, start, channel.times - late)
-            - _sample(angle, start, channel.begins - late))
+    turn = (sample(angle, start, channel.times - late)
+            - sample(angle, start, channel.begins - late))
     if name == 'turn':
         return turn / span
     distance = grid[:, _COLUMN['distance']]
-    way = (_sample(distance, start, channel.times - late)
-           - _sample(distance, start, channel.begins - late))
+    way = (sample(distance, start, channel.times - late)
+           - sample(distance, start, channel.begins - late))
     chord: FloatArray = way * np.sinc(turn / (2.0 * np.pi)) / span
     return chord
 
