@@ -164,6 +164,13 @@ def evaluate(text: str, values: Mapping[str, float]) -> float:
 
 def substituted(text: str, replacements: Mapping[str, str]) -> str:
     """Return the expression with names replaced by other expressions."""
+    return _substituted(text, tuple(replacements.items()))
+
+
+@lru_cache(maxsize=4096)
+def _substituted(text: str, pairs: tuple[tuple[str, str], ...]) -> str:
+    replacements = dict(pairs)
+
     class Replace(ast.NodeTransformer):
         def visit_Name(self, node: ast.Name) -> ast.expr:
             return parse(replacements[node.id]) if node.id in replacements else node
@@ -192,10 +199,14 @@ def linear_coefficients(text: str, variables: tuple[str, ...]) -> dict[str, str]
         Coefficient (an expression free of the variables) of each variable that occurs;
         None if the expression is not linear, or has a constant term.
     """
-    split = _affine(parse(text), frozenset(variables))
-    if split is None or split[0] is not None:
-        return None
-    return split[1]
+    coefficients = _linear(text, frozenset(variables))
+    return None if coefficients is None else dict(coefficients)
+
+
+@lru_cache(maxsize=4096)
+def _linear(text: str, variables: frozenset[str]) -> dict[str, str] | None:
+    split = _affine(parse(text), variables)
+    return None if split is None or split[0] is not None else split[1]
 
 
 def _affine(node: ast.expr, variables: frozenset[str],

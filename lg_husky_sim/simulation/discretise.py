@@ -68,9 +68,10 @@ def expm(matrix: FloatArray) -> FloatArray:
     norm = float(np.max(np.sum(np.abs(matrix), axis=1)))
     squarings = max(0, math.ceil(math.log2(norm / 0.5))) if norm > 0.5 else 0
     scaled = matrix / 2.0 ** squarings
-    result = np.eye(matrix.shape[0])
+    identity = np.eye(matrix.shape[0])
+    result = identity
     for order in range(14, 0, -1):
-        result = np.eye(matrix.shape[0]) + scaled @ result / order
+        result = identity + scaled @ result / order
     for _ in range(squarings):
         result = result @ result
     return result
@@ -132,6 +133,8 @@ def _stage(command: CommandStage, period: float) -> list[float]:
 
 
 def _padded(array: NDArray[np.generic], shape: tuple[int, ...]) -> NDArray[np.generic]:
+    if array.shape == shape:
+        return array
     return np.pad(array, [(0, want - have) for want, have in zip(shape, array.shape,
                                                                  strict=True)])
 

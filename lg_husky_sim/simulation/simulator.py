@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 import math
 
 from lg_husky_sim.errors import ParameterError
@@ -142,7 +143,7 @@ class Simulator:
         if np.any(wanted):
             # The nearest steady drive, so that controllers and belts start where they would be,
             # and the least change that makes it agree with what is wanted.
-            steady = np.linalg.lstsq(-one.a, one.b, rcond=None)[0]
+            steady = self._steady
             nearest = steady @ np.linalg.lstsq(one.rows[:4] @ steady, wanted, rcond=None)[0]
             flat[:n] = nearest + np.linalg.lstsq(
                 one.rows[:4], wanted - one.rows[:4] @ nearest, rcond=None)[0]
@@ -153,13 +154,19 @@ class Simulator:
         row[7:13] = *wheel_angles, 0.0, pose.heading, pose.x, pose.y
         return _state(flat, row, n)
 
+    @cached_property
+    def _steady(self) -> FloatArray:
+        # States per volt of steady driving, shape (n, 2).
+        one = self.plant.sets[0]
+        return np.asarray(np.linalg.lstsq(-one.a, one.b, rcond=None)[0], dtype=np.float64)
+
     def _rolling(self, twist: BodyTwist) -> tuple[float, float]:
         # Wheel rates without slip: those at which the wheels' dampers carry no torque.
         command = self.plant.sets[0].command
         rates = np.array([twist.forward * command.volts_per_speed
                           + sign * twist.yaw * command.volts_per_rate for sign in (-1.0, 1.0)])
         one = self.plant.sets[0]
-        gains = one.rows[:4] @ np.linalg.lstsq(-one.a, one.b, rcond=None)[0]
+        gains = one.rows[:4] @ self._steady
         body = gains[2:] @ rates
         share = [twist.forward / body[0] if body[0] else 1.0,
                  twist.yaw / body[1] if body[1] else 1.0]
@@ -232,7 +239,7 @@ class Simulator:
         if state.n == n:
             return state
         one = self.plant.sets[0]
-        steady = np.linalg.lstsq(-one.a, one.b, rcond=None)[0]
+        steady = self._steady
         drive = np.linalg.lstsq(one.rows[:4] @ steady, state.row[:4], rcond=None)[0]
         nearest = steady @ drive
         flat = np.concatenate([nearest, state.flat[state.n:]])
