@@ -14,16 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+import math
 
 from lg_husky_sim.diagnosis.fits import extras_of, Fit
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.identification.pieces import Channel, Piece
 from lg_husky_sim.identification.problem import Observations, PERIOD, simulate_piece
+from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.kernel import COLUMNS
 from lg_husky_sim.simulation.simulator import hold, Simulator
 import numpy as np
-from scipy.signal import lfilter
 
 #: Size of each error that is believed possible, as a part of the channel's root mean square.
 BELIEVED = 0.3
@@ -106,10 +107,19 @@ def _features(grid: FloatArray, held: FloatArray) -> FloatArray:
         commands[:, 0], commands[:, 1]))
     parts = []
     for lag in LAGS:
-        keep = np.exp(-PERIOD / lag) if lag else 0.0
-        start = raw[:1] * keep
-        parts.append(lfilter([1.0 - keep], [1.0, -keep], raw, axis=0, zi=start)[0])
+        parts.append(_smoothed(raw, math.exp(-PERIOD / lag) if lag else 0.0))
     return np.hstack(parts)
+
+
+@jit
+def _smoothed(raw: FloatArray, keep: float) -> FloatArray:
+    # A lag of first order, settled at the first row; row by row, since each needs the one before.
+    out = np.empty_like(raw)
+    out[0] = raw[0]
+    for row in range(1, raw.shape[0]):
+        for column in range(raw.shape[1]):
+            out[row, column] = keep * out[row - 1, column] + (1.0 - keep) * raw[row, column]
+    return out
 
 
 def _sampled(features: FloatArray, piece: Piece, channel: Channel) -> FloatArray:

@@ -13,7 +13,7 @@ from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 #: Half width of a 95 % interval in standard deviations.
 TWO_SIDED = 1.96
@@ -97,7 +97,7 @@ def p_value(gain: float, freedom: int, hypotheses: int) -> float:
     -------
     float
     """
-    single = float(chi2.sf(2.0 * max(gain, 0.0), max(freedom, 1)))
+    single = float(chdtrc(max(freedom, 1), 2.0 * max(gain, 0.0)))
     return min(1.0, single * hypotheses)
 
 

@@ -17,7 +17,7 @@ import itertools
 from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from scipy import stats
+from scipy.special import ndtri, stdtrit
 
 #: Length of a block [s].
 BLOCK = 2.0
@@ -131,8 +131,8 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     plain = bread * level
     sandwich = bread @ meat @ bread
     # The scatter of few blocks is itself uncertain: Student's t widens it, and only it.
-    normal = float(stats.norm.ppf(0.5 + 0.5 * LEVEL))
-    student = float(stats.t.ppf(0.5 + 0.5 * LEVEL, max(blocks - count, 1)))
+    normal = float(ndtri(0.5 + 0.5 * LEVEL))
+    student = float(stdtrit(max(blocks - count, 1), 0.5 + 0.5 * LEVEL))
     variances = np.maximum(np.diag(sandwich) * (student / normal) ** 2, np.diag(plain))
     lift = np.sqrt(variances / np.maximum(np.diag(plain), 1e-300))
     covariance = plain * np.outer(lift, lift)
@@ -183,7 +183,7 @@ def undetermined(result: Confidence, values: FloatArray) -> tuple[str, ...]:
     """
     said: list[str] = []
     deviations = result.deviations
-    reach = stats.norm.ppf(0.5 + 0.5 * LEVEL)
+    reach = float(ndtri(0.5 + 0.5 * LEVEL))
     names = [u.name for u in result.unknowns]
     relative = [_relative(n, u, float(d), float(v)) for n, u, d, v in zip(
         names, result.unknowns, deviations, values, strict=True)]

@@ -21,7 +21,6 @@ from lg_husky_sim.identification.relations import apart, coefficients
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy.ndimage import maximum_filter1d
-from scipy.signal import lfilter
 
 #: Uncertainty of a stamp [s].
 STAMP = 0.004
@@ -332,7 +331,7 @@ def _taps(parts: list[FloatArray], order: int) -> FloatArray:
     index = np.abs(np.subtract.outer(np.arange(order), np.arange(order)))
     taps = np.concatenate([[1.0], -np.linalg.solve(covariance[index], covariance[1:])]) if (
         order) else np.ones(1)
-    innovations = np.concatenate([lfilter(taps, [1.0], part) for part in parts])
+    innovations = np.concatenate([np.convolve(taps, part)[:part.size] for part in parts])
     level = max(float(np.sqrt(np.mean(np.clip(
         innovations, -5.0 * max(spread(innovations), 1e-9),
         5.0 * max(spread(innovations), 1e-9)) ** 2))), 1e-9)

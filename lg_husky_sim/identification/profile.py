@@ -11,10 +11,10 @@ from lg_husky_sim.errors import FitError
 from lg_husky_sim.identification.least_squares import Problem, Solution, solve
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from scipy import stats
+from scipy.special import chdtri
 
 #: Rise of the cost at the ends of a 95 % interval [nats].
-LEVEL = 0.5 * float(stats.chi2.ppf(0.95, 1))
+LEVEL = 0.5 * float(chdtri(1, 0.05))
 #: Values of the held parameter on either side of the estimate.
 SIDE = 5
 #: Farthest value, in standard deviations.

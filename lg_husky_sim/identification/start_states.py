@@ -24,8 +24,8 @@ from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import BodyTwist, FloatArray
 from lg_husky_sim.simulation.simulator import Simulator
 import numpy as np
-from scipy import stats
 from scipy.linalg import expm
+from scipy.special import ndtri
 
 #: Name of the whole among the unknowns of a recording.
 INITIAL_STATE = 'initial_state'
@@ -190,7 +190,7 @@ def start_states(data: Observations, unknowns: Sequence[Unknown], values: Sequen
         Their standard deviations.
     """
     found = []
-    reach = float(stats.norm.ppf(0.975))
+    reach = float(ndtri(0.975))
     for unknown, value, deviation in zip(unknowns, values, map(float, deviations),
                                          strict=True):
         if unknown.local is None:
