@@ -26,7 +26,6 @@ from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,14 +243,14 @@ class Sums:
     own: FloatArray
     along: FloatArray
 
-    def gain(self, groups: NDArray[np.bool_] | slice, free_sign: bool
+    def gain(self, groups: NDArray[np.bool_], free_sign: bool
              ) -> tuple[float, tuple[float, ...]]:
         """
         Return what the columns explain when they are on in some groups only.
 
         Parameters
         ----------
-        groups : numpy.ndarray of bool, shape (n_groups,), or slice
+        groups : numpy.ndarray of bool, shape (n_groups,)
         free_sign : bool
             Whether they may enter with a negative sign.
 
@@ -262,10 +261,30 @@ class Sums:
         tuple of float
             Best multiples.
         """
-        return self._gain([groups], free_sign)
+        drops, sizes = self.gains(groups[None], free_sign)
+        return float(drops[0]), tuple(sizes[0].tolist())
+
+    def gains(self, choices: NDArray[np.bool_], free_sign: bool
+              ) -> tuple[FloatArray, FloatArray]:
+        """
+        Return :meth:`gain` for many choices of groups at once.
+
+        Parameters
+        ----------
+        choices : numpy.ndarray of bool, shape (n_choices, n_groups)
+        free_sign : bool
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_choices,)
+            Drops of the half sum of squares [nats].
+        numpy.ndarray, shape (n_choices, k)
+            Best multiples.
+        """
+        return _drops(*self._over(choices), free_sign)
 
     def beside(self, groups: NDArray[np.bool_], others: NDArray[np.bool_], free_sign: bool
-               ) -> float:
+               ) -> FloatArray:
         """
         Return what the columns explain elsewhere, once they are on in some groups.
 
@@ -273,44 +292,49 @@ class Sums:
         ----------
         groups : numpy.ndarray of bool, shape (n_groups,)
             Where they are on.
-        others : numpy.ndarray of bool, shape (n_groups,)
+        others : numpy.ndarray of bool, shape (n_choices, n_groups)
             Where they are on with other sizes as well.
         free_sign : bool
             Whether they may enter with a negative sign.
 
         Returns
         -------
-        float
-            Further drop of the half sum of squares [nats].
+        numpy.ndarray, shape (n_choices,)
+            Further drops of the half sum of squares [nats].
         """
-        alone, both = (self._gain(sets, free_sign)[0] for sets in (
-            [groups], [groups, others]))
-        return max(both - alone, 0.0)
+        own, added = self._over(groups[None]), self._over(others)
+        count, size = added[2].shape
+        onto, along = (np.concatenate([np.broadcast_to(one, two.shape), two], axis=-1)
+                       for one, two in ((own[0], added[0]), (own[2], added[2])))
+        inner = np.zeros((count, 2 * size, 2 * size))
+        inner[:, :size, :size], inner[:, size:, size:] = own[1], added[1]
+        both = _drops(onto, inner, along, free_sign)[0]
+        further: FloatArray = np.maximum(both - _drops(*own, free_sign)[0], 0.0)
+        return further
 
-    def _gain(self, sets: Sequence[NDArray[np.bool_] | slice], free_sign: bool
-              ) -> tuple[float, tuple[float, ...]]:
-        # Asked ten thousands of times, of a few columns: calls cost more than numbers here.
-        ontos = [self.onto[groups].sum(axis=0) for groups in sets]
-        own = [self.own[groups].sum(axis=0) for groups in sets]
-        alongs = [self.along[groups].sum(axis=0) for groups in sets]
-        if len(sets) == 1:
-            onto, inner, along = ontos[0], own[0], alongs[0]
-        else:
-            onto, inner, along = np.hstack(ontos), block_diag(*own), np.concatenate(alongs)
-        matrix = inner - onto.T @ onto
-        norms = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
-        there = norms > 1e-6
-        if not there.any():
-            return 0.0, tuple(0.0 for _ in norms)
-        safe = np.where(there, norms, 1.0)
-        scaled = matrix / (safe[:, None] * safe)
-        scaled.flat[::norms.size + 1] += 1e-6
-        target = np.where(there, along / safe, 0.0)
-        best = np.linalg.solve(scaled, target)
-        if not free_sign:
-            best = np.maximum(best, 0.0)
-        gain = float(best @ target - 0.5 * best @ scaled @ best)
-        return gain, tuple((best / safe).tolist())
+    def _over(self, choices: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        # The sums over each choice's groups.
+        weights = choices.astype(np.float64)
+        onto, own, along = (np.tensordot(weights, one, axes=1)
+                            for one in (self.onto, self.own, self.along))
+        return onto, own, along
+
+
+def _drops(onto: FloatArray, own: FloatArray, along: FloatArray, free_sign: bool
+           ) -> tuple[FloatArray, FloatArray]:
+    # A stack of small least squares, each scaled to columns of length one.
+    matrix = own - np.swapaxes(onto, 1, 2) @ onto
+    norms = np.sqrt(np.maximum(np.diagonal(matrix, axis1=1, axis2=2), 0.0))
+    there = norms > 1e-6
+    safe = np.where(there, norms, 1.0)
+    scaled = matrix / (safe[:, :, None] * safe[:, None, :]) + 1e-6 * np.eye(norms.shape[1])
+    target = np.where(there, along / safe, 0.0)
+    best = np.linalg.solve(scaled, target[:, :, None])[:, :, 0]
+    if not free_sign:
+        best = np.maximum(best, 0.0)
+    bent = (scaled @ best[:, :, None])[:, :, 0]
+    drops: FloatArray = np.sum(best * (target - 0.5 * bent), axis=1)
+    return drops, best / safe
 
 
 def scan(projector: Projector, signatures: Sequence[Signature],
@@ -349,7 +373,7 @@ def scan(projector: Projector, signatures: Sequence[Signature],
     for signature, sums in zip(signatures, projector.all_sums(white, parts, whole, 1),
                                strict=True):
         if not signature.candidate.effect.kind.needs_onset:
-            gain, size = sums.gain(slice(None), signature.free_sign)
+            gain, size = sums.gain(np.array([True]), signature.free_sign)
             offer(Score(signature, gain, size), 'always')
     summed: dict[int, list[Sums]] = {}
     for family in onsets:
@@ -358,12 +382,15 @@ def scan(projector: Projector, signatures: Sequence[Signature],
         if id(family.groups) not in summed:
             summed[id(family.groups)] = projector.all_sums(white, parts, family.groups,
                                                            family.count)
+        choices = np.array([groups for _, groups in family.onsets])
+        placebos = np.array(family.placebos)
         for signature, sums in zip(signatures, summed[id(family.groups)], strict=True):
-            tried = [(*sums.gain(groups, signature.free_sign), onset, groups)
-                     for onset, groups in family.onsets]
-            gain, size, onset, groups = max(tried, key=lambda one: one[0])
-            placebo = max((sums.beside(groups, other, signature.free_sign)
-                           for other in family.placebos), default=0.0)
-            offer(Score(signature, gain, size, onset, placebo),
-                  'given' if family.given else 'late')
+            gains, sizes = sums.gains(choices, signature.free_sign)
+            # The first of those that only rounding tells apart: nothing lies between them.
+            best_of = int(np.argmax(gains >= np.max(gains) - 1e-9))
+            onset, groups = family.onsets[best_of]
+            placebo = float(np.max(sums.beside(groups, placebos, signature.free_sign))) if (
+                len(placebos)) else 0.0
+            offer(Score(signature, float(gains[best_of]), tuple(sizes[best_of].tolist()), onset,
+                        placebo), 'given' if family.given else 'late')
     return sorted(best.values(), key=lambda s: -s.gain)
