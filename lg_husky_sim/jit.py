@@ -48,7 +48,11 @@ def _compiled(function: Function, options: dict[str, bool]) -> Function:
     if not compiled():
         return function
     import numba
-    wrapped = numba.njit(cache=True, nogil=True, error_model='numpy', **options)(function)
+    from numba.core.options import DefaultOptions
+
+    # '_nrt' is no public option: a numba that no longer has it only makes slower code.
+    known = {name: value for name, value in options.items() if hasattr(DefaultOptions, name)}
+    wrapped = numba.njit(cache=True, nogil=True, error_model='numpy', **known)(function)
     source = Path(function.__code__.co_filename)
     if source.is_file():
         _SOURCES.add(source)
