@@ -16,7 +16,8 @@ REALTIME = {
     'test_contract_live.py', 'test_contract_node.py', 'test_contract_process.py',
     'test_contract_standard.py', 'test_graph_numeric.py',
 }
-"""Files whose tests measure time or talk to live processes: a busy machine would fail them."""
+"""Files whose tests measure time or talk to live processes: a busy machine would fail them.
+A single such test in another file has the marker itself."""
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -77,6 +77,7 @@ def test_wheels_are_found_by_name(names: list[str], rates: list[float],
     assert _sides(names, rates) == wanted
 
 
+@pytest.mark.realtime
 def test_live_error_drops_with_the_augmented_model(
         drive: Callable[..., Recording], tmp_path: Path) -> None:
     write_recording(tmp_path / 'bag', drive('any', 'rotation', 4).streams,
