@@ -37,9 +37,8 @@ def jit_part(function: Function) -> Function:
     """
     Compile a function that compiled ones call in their inner loop, as :func:`jit` does.
 
-    It must not allocate, slice or return an array. Its code goes into its callers', and its
-    arrays are not counted: an atomic increment and decrement for each array of each call took a
-    third of the time of a step.
+    It must not allocate, slice or return an array: its code goes into its callers', and its
+    arrays are not counted, which takes an atomic increment and decrement for each one and call.
     """
     return _compiled(function, {'_nrt': False, 'forceinline': True})
 

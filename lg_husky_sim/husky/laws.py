@@ -184,7 +184,6 @@ def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatA
     out : numpy.ndarray, shape (n_efforts,)
         Receives the efforts.
     """
-    circle, radius, root = -1.0, 0.0, 0.0
     for j in range(out.size):
         law = laws[c, j]
         p0, p1 = coefficients[c, j, 0], coefficients[c, j, 1]
@@ -210,13 +209,8 @@ def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatA
             out[j] = p0 * math.tanh(p1 * z[o] / p0) - p1 * z[o]
         elif law == 16:
             own, other = p1 * z[o], p2 * z[o + 1]
-            total = own * own + other * other
-            # A contact's two forces have one circle; its root is most of the work.
-            if total != circle or p0 != radius:
-                circle, radius = total, p0
-                square = total / (p0 * p0)
-                root = (1.0 + square * math.sqrt(square)) ** (-1.0 / 3.0)
-            out[j] = (root - 1.0) * own
+            square = (own * own + other * other) / (p0 * p0)
+            out[j] = ((1.0 + square * math.sqrt(square)) ** (-1.0 / 3.0) - 1.0) * own
         elif law == 15:
             selector = int(p0)
             out[j] = _table(coefficients, c, j, z[o] if selector < 0 else context[selector])

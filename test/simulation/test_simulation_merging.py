@@ -33,8 +33,7 @@ def test_tyres_of_one_side_slip_alike(robot: Maker) -> None:
 @pytest.mark.parametrize('name', sorted(catalogue()))
 def test_the_drive_is_the_same(robot: Maker, monkeypatch: pytest.MonkeyPatch,
                                name: str) -> None:
-    plant = robot(TYRES, Effect(name)) if name != TYRES.id else (
-        robot(TYRES))
+    plant = robot(TYRES, *([] if name == TYRES.id else [name]))
     simulator = Simulator(plant, 0.02)
     _, one = simulator.run(simulator.initial(), DRIVE)
     monkeypatch.setattr(discretise, 'merged', lambda same: same)
