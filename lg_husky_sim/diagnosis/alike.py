@@ -117,8 +117,7 @@ def _smoothed(raw: FloatArray, keep: float) -> FloatArray:
     out = np.empty_like(raw)
     out[0] = raw[0]
     for row in range(1, raw.shape[0]):
-        for column in range(raw.shape[1]):
-            out[row, column] = keep * out[row - 1, column] + (1.0 - keep) * raw[row, column]
+        out[row] = keep * out[row - 1] + (1.0 - keep) * raw[row]
     return out
 
 

@@ -13,12 +13,13 @@ _COMPILED = compiled()
 
 
 @jit
-def _loop(column: FloatArray, start: float, times: FloatArray) -> FloatArray:
-    # What the arrays below do, in one pass: most stamps are asked for thousands of times.
+def _loop(column: FloatArray, start: float, period: float, times: FloatArray) -> FloatArray:
+    # What the arrays below do, in one pass: most stamps are asked for thousands of times. The
+    # period is told, since machine code on disk would keep another module's old constant.
     last = column.size - 1.000001
     out = np.empty(times.size)
     for i in range(times.size):
-        place = min(max((times[i] - start) / PERIOD, 0.0), last)
+        place = min(max((times[i] - start) / period, 0.0), last)
         left = int(place)
         share = place - left
         out[i] = column[left] * (1.0 - share) + column[left + 1] * share
@@ -43,7 +44,7 @@ def sample(column: FloatArray, start: float, times: FloatArray) -> FloatArray:
     numpy.ndarray, shape (n,)
     """
     if _COMPILED:
-        return _loop(column, start, times)
+        return _loop(column, start, PERIOD, times)
     place = np.clip((times - start) / PERIOD, 0.0, column.size - 1.000001)
     left = place.astype(np.int64)
     share = place - left
