@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+import math
 
 from lg_husky_sim.diagnosis.candidates import Candidate, neutral
 from lg_husky_sim.diagnosis.fits import cost_at, extras_of, Fit, fit_structure
@@ -18,6 +19,11 @@ import numpy as np
 
 #: Parts of a scored size that a refit may begin from.
 GENTLER = (1.0, 0.4, 0.1)
+#: Part of what screening promised that a value of the catalogue must keep; else it is looked for
+#: between the catalogue's values, in so many steps.
+KEPT, STEPS_BETWEEN = 0.25, 9
+#: Ratio of the golden section.
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +81,46 @@ def _others(candidate: Candidate, chosen: Mapping[str, float]) -> list[dict[str,
             if value != chosen[name]]
 
 
+def between(cost: Callable[[Mapping[str, float]], float], harmful: Mapping[str, float],
+            idle: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+    """
+    Look for the best size between one that does too much and one that does nothing.
+
+    Parameters
+    ----------
+    cost : callable
+        Of the values of an effect's parameters [nats].
+    harmful, idle : mapping of str to float
+        Values of the same parameters; a limit between them may begin to act anywhere.
+
+    Returns
+    -------
+    float
+        Lowest cost that was met.
+    dict of str to float
+        Its values, on the straight line of the logarithms where both are positive.
+    """
+    def at(part: float) -> dict[str, float]:
+        return {name: value * (idle[name] / value) ** part if value * idle[name] > 0.0
+                else value + part * (idle[name] - value) for name, value in harmful.items()}
+
+    def seen(part: float) -> tuple[float, float]:
+        return cost(at(part)), part
+    low, high = 0.0, 1.0
+    inner, outer = seen(high - GOLDEN), seen(low + GOLDEN)
+    best = min(inner, outer)
+    for _ in range(STEPS_BETWEEN - 2):
+        # Where both cost the same the effect does nothing yet: it begins nearer to the harmful.
+        if inner[0] <= outer[0]:
+            high, outer = outer[1], inner
+            inner = seen(high - GOLDEN * (high - low))
+        else:
+            low, inner = inner[1], outer
+            outer = seen(low + GOLDEN * (high - low))
+        best = min(best, inner, outer)
+    return best[0], at(best[1])
+
+
 def refit(observations: Observations, base: Fit, nominal: Parameters, score: Score,
           metric_: Metric, steps: int = 2, start: Fit | None = None) -> Fit | None:
     """
@@ -113,6 +159,12 @@ def refit(observations: Observations, base: Fit, nominal: Parameters, score: Sco
     # The signature is a straight line through a bent world: begin where it is really best.
     tried = [(cost(sized), sized) for sized in _sizes(score)]
     least, sized = min(tried, key=lambda one: one[0])
+    if not score.signature.candidate.signed and tried[0][1] is not sized:
+        idle = cost_at(observations, base.structure, nominal, metric_, base.solution.values, own)
+        if idle - least < KEPT * score.gain:
+            # A limit between two of its values: the one does too much, the other nothing.
+            least, sized = min((least, sized), between(cost, tried[0][1], sized),
+                               key=lambda one: one[0])
     for other in _others(score.signature.candidate, sized):
         # One number after the other: a limit above all commands has no slope to follow.
         again = cost(mixed := {**sized, **other})

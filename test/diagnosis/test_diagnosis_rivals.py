@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.candidates import Candidate, candidates, effect_entries
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost, strain
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate, shared_metric
 from lg_husky_sim.diagnosis.judge import is_unnamed
-from lg_husky_sim.diagnosis.refits import refit
+from lg_husky_sim.diagnosis.refits import between, refit
 from lg_husky_sim.diagnosis.rivals import adopts, most_credible, rank, Rival
 from lg_husky_sim.diagnosis.rounds import left_by, play_round, Round, settled
 from lg_husky_sim.diagnosis.screening import Score, Signature
@@ -31,6 +31,8 @@ import pytest
 Record = Callable[..., Recording]
 PAYLOAD = Effect('payload', shape='chassis')
 LIMIT = Effect('command_limit', shape='both')
+#: Limit [m/s] between two values of the catalogue, the upper of which no command reaches.
+ENCLOSED = 0.84
 
 
 def plant_with(effect: Effect, values: dict[str, float]) -> Plant:
@@ -72,6 +74,32 @@ def test_a_limit_above_all_commands_is_tried_lower(data: Observations, base: Fit
     assert fit is not None
     assert fit.parameters['limit_forward'] == pytest.approx(0.55, abs=0.03)
     assert fit.parameters['limit_yaw'] == pytest.approx(0.4, abs=0.03)
+
+
+@pytest.mark.parametrize('true', [1.02, 1.254, 1.45])
+def test_a_limit_between_two_values_is_found(true: float) -> None:
+    """The lower value does too much; the upper one does nothing, and has no slope."""
+    def cost(sized: Mapping[str, float]) -> float:
+        over = max(1.49 - sized['limit'], 0.0)
+        return 4e4 * over * (over - 2.0 * (1.49 - true))
+    least, sized = between(cost, {'limit': 1.0}, {'limit': 1.5})
+    assert least < 0.0
+    assert sized['limit'] == pytest.approx(true, abs=0.02)
+
+
+def test_a_limit_that_the_catalogue_encloses_is_refitted(record: Record) -> None:
+    model, effect = load_model(), Effect('command_limit', shape='forward')
+    plant = plant_with(effect, {'limit_forward': ENCLOSED})
+    drive = ((1.0, 0.0, 0.0), (3.0, 0.88, 0.0), (2.0, 0.4, 0.5), (3.0, -0.87, 0.0),
+             (2.0, 0.0, -0.6), (3.0, 0.89, 0.3), (1.0, 0.0, 0.0))
+    limited = observations(segments(record('rec', plant, drive, 1)))
+    plain = recalibrate(limited, model.structure, model.parameters)
+    used = shared_metric(limited, plain, [])
+    starts = [start['limit_forward'] for start in candidate(effect).starts]
+    harmful = starts.index(max(one for one in starts if one < ENCLOSED))
+    found = refit(limited, plain, model.parameters, scored(effect, 300.0, start=harmful), used, 6)
+    assert found is not None
+    assert found.parameters['limit_forward'] == pytest.approx(ENCLOSED, abs=0.01)
 
 
 def test_a_robot_at_its_nominal_numbers_is_not_strained(base: Fit) -> None:
