@@ -17,7 +17,7 @@ import math
 from lg_husky_sim.diagnosis.fits import EVENT, Fit
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.husky.effects import Subsystem
-from lg_husky_sim.identification.noise import scales, spread
+from lg_husky_sim.identification.noise import Metric, scales, spread
 from lg_husky_sim.identification.pieces import UNITS
 from lg_husky_sim.identification.problem import Observations
 import numpy as np
@@ -27,13 +27,15 @@ LARGEST = 1e4
 #: What moments hold beyond what the rest would let expect, per value, from which something is
 #: missing [nats]: a lost command leaves up to 0.2, a gear's play 0.4. How many moments, at least.
 MUCH, TIMES = 1.0, 3
-#: The same where it is asked what changed: multiple of that before the change.
-BEFORE = 3.0
+#: The same where it is asked what changed: multiple of that before the change. Moments are others
+#: than before if they come so many times as often, or leave the model so many times as far.
+BEFORE, OTHERS = 3.0, 2.0
 #: Parts that names leave too much of: of what moments held without them, if they leave so much of
 #: what was unexplained in between, too. A robot that was understood may still stumble.
 LEFT, BETWEEN = 0.5, 0.15
-#: Gap between two moments [s], and how many of them are told.
-GAP, TOLD = 0.5, 3
+#: Gap between two moments [s], and how many of them are told. Time that a moment may take until
+#: the robot follows the model again [s].
+GAP, TOLD, AFTERWARDS = 0.5, 3, 1.0
 #: Part of the largest channel's from which both sides are hit.
 BOTH = 0.25
 #: Part of the robot that a channel tells of, where nothing else does.
@@ -60,7 +62,9 @@ class Moments:
     width : float
         Robust deviation of the residual, in units of the noise; at least 1.
     largest : float
-        Largest residual [unit of the channel].
+        Largest residual in a moment [unit of the channel].
+    count : int
+        Values of the channel.
     begins : tuple of (str, float)
         Recording and time [s] of each moment, the one that holds most first.
     """
@@ -68,6 +72,7 @@ class Moments:
     excess: float
     width: float
     largest: float
+    count: int
     begins: tuple[tuple[str, float], ...]
 
 
@@ -115,7 +120,7 @@ def moments(observations: Observations, fit: Fit, widths: Mapping[str, float] | 
             begins.sort(key=lambda one: -one[0])
         found[name] = Moments(
             float(np.mean(over)), width,
-            float(np.max(np.abs(residual[whole[inside]]), initial=0.0)),
+            float(np.max(np.abs(residual[whole[inside]]), initial=0.0)), whole.size,
             tuple((recording, time) for _, recording, time in begins))
     return found
 
@@ -137,7 +142,61 @@ def what_happens(search: Search) -> dict[str, Moments]:
     found = moments(search.observations, search.final, None, after)
     usual = moments(search.observations, search.final, None, before)
     return {name: one for name, one in found.items() if len(one.begins) >= TIMES
-            and one.excess > MUCH + BEFORE * (usual[name].excess if name in usual else 0.0)}
+            and one.excess > MUCH + BEFORE * (usual[name].excess if name in usual else 0.0)
+            and (name not in usual or are_others(one, usual[name]))}
+
+
+def are_others(one: Moments, usual: Moments) -> bool:
+    """
+    Return whether moments are others than those before a change.
+
+    Parameters
+    ----------
+    one, usual : Moments
+        Of one channel, after and before it: a floor on which wheels stick and slip lets them do so
+        before a change, too.
+
+    Returns
+    -------
+    bool
+        Whether they come more often, or leave the model farther.
+    """
+    if not usual.begins:
+        return True
+    often = (len(one.begins) / one.count) / ((len(usual.begins) + 1) / usual.count)
+    return often > OTHERS or one.largest > OTHERS * usual.largest
+
+
+def energy_in_moments(search: Search) -> float:
+    """
+    Return what the moments of the recordings in question hold before anything is adopted.
+
+    Parameters
+    ----------
+    search : Search
+
+    Returns
+    -------
+    float
+        Half the sum of squares of what the model leaves in them, with their full weight [nats]:
+        what screening likes for so much it may like for a lost command alone.
+    """
+    observations, first = search.observations, search.rounds[0]
+    predicted = first.base.solution.predicted
+    residual = observations.measured - predicted
+    begins = {begin for one in moments(observations, first.base, None, search.sides[1]).values()
+              for begin in one.begins}
+    full = Metric(scales(observations, residual, predicted), first.metric.filters,
+                  first.metric.parts)
+    white = full.whiten(observations, residual)
+    inside = np.zeros(white.size, dtype=bool)
+    for one in observations.slices:
+        times = observations.times[one.first:one.last]
+        for recording, begin in begins:
+            if observations.pieces[one.piece].recording == recording:
+                inside[one.first:one.last] |= (times >= begin - GAP) & (
+                    times <= begin + AFTERWARDS)
+    return 0.5 * float(np.sum(white[inside] ** 2))
 
 
 def remain(search: Search) -> bool:

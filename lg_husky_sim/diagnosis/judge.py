@@ -12,6 +12,7 @@ from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_valu
 from lg_husky_sim.diagnosis.doubts import belief, further_gain, reading_gain
 from lg_husky_sim.diagnosis.events import (
     elements_of,
+    energy_in_moments,
     event_words,
     NOW_AND_THEN,
     place_of,
@@ -50,8 +51,8 @@ DESCRIBED = 45.0
 #: Held-out gain of a smooth effort that begins with the later recordings from which something has
 #: changed [nats], and how much farther from the model than the earlier ones these must be then.
 SMOOTH_CHANGE, SMOOTH_FARTHER = 1000.0, 1.6
-#: Gain before anything is refitted from which something has changed [nats]: signatures of the
-#: catalogue explain it then, and none of their refits does.
+#: Gain before anything is refitted, beyond what single moments hold, from which something has
+#: changed [nats]: signatures of the catalogue explain it then, and none of their refits does.
 SCREENED_CHANGE = 500.0
 #: Held-out gain at which nothing missing is even with something, and its width [nats]; then of a
 #: change between recordings.
@@ -207,7 +208,7 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     screened = first.scores[0].gain if first.scores else 0.0
     tried = max((r.evidence for r in first.rivals), default=0.0)
     if search.change is not None:
-        return screened > SCREENED_CHANGE or (
+        return screened > SCREENED_CHANGE + energy_in_moments(search) or (
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]) or (
             unnamed is not None and unnamed.held_out > SMOOTH_CHANGE
             and unnamed.share > CHANGE_SHARE[1]

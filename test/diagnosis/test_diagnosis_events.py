@@ -8,18 +8,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 import re
 
-from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.candidates import candidates, effect_entries
 from lg_husky_sim.diagnosis.diagnose import diagnose
 from lg_husky_sim.diagnosis.events import (
+    are_others,
     elements_of,
+    energy_in_moments,
     event_words,
+    Moments,
     moments,
     place_of,
     remain,
     what_happens,
 )
 from lg_husky_sim.diagnosis.fits import first_metric, fit_structure, recalibrate
+from lg_husky_sim.diagnosis.judge import is_unnamed
 from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.rounds import Round
+from lg_husky_sim.diagnosis.screening import Score, Signature
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind, Subsystem
 from lg_husky_sim.husky.model import compile_model
@@ -27,6 +33,7 @@ from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.problem import observations
 from lg_husky_sim.recording import Recording, segments
+import numpy as np
 import pytest
 
 Steps = Sequence[tuple[float, float, float]]
@@ -101,6 +108,33 @@ def test_what_happened_before_is_no_change(stalled: Callable[..., Recording],
     recordings = [stalled('base', 1, before), stalled('rec', 2)]
     search = looked_at(recordings, Onset(OnsetKind.TIME, 0.0, 'rec'))
     assert bool(what_happens(search)) is happens
+
+
+@pytest.mark.parametrize(('often', 'largest', 'others'), [
+    (10, 0.25, False), (23, 0.25, True), (10, 0.5, False), (4, 0.6, True)])
+def test_moments_like_those_before_are_no_others(often: int, largest: float, others: bool) -> None:
+    def seen(times: int, size: float) -> Moments:
+        return Moments(1.0, 1.0, size, 1000, tuple(('rec', float(k)) for k in range(times)))
+    assert are_others(seen(often, largest), seen(10, 0.28)) is others
+    assert are_others(seen(often, largest), seen(0, 0.0))
+
+
+@pytest.mark.parametrize(('gain', 'unknown'), [(0.5, False), (2.0, True)])
+def test_a_lost_command_alone_is_no_change(stalled: Callable[..., Recording], gain: float,
+                                           unknown: bool) -> None:
+    """Screening may like some effect for one moment; nothing has changed for that."""
+    search = looked_at([stalled('base', 1, ()), stalled('rec', 2, STALLS[:1])],
+                       Onset(OnsetKind.TIME, 0.0, 'rec'))
+    metric = first_metric(search.observations, search.plain.solution.predicted)
+    one = candidates()[0]
+    held = energy_in_moments(replace(search, rounds=(
+        Round(search.plain, (), (), metric, 0.0, False),)))
+    assert held > 1000.0
+    liked = Score(Signature(one, one.starts[0], np.zeros((0, 1)), one.signed), 500.0 + gain * held,
+                  (1.0,))
+    found = Round(search.plain, (liked,), (), metric, 0.0, False)
+    assert not what_happens(search)
+    assert is_unnamed(replace(search, rounds=(found,)), None) is unknown
 
 
 def test_names_that_cure_the_moments_stand(record: Record, steps: Steps) -> None:
