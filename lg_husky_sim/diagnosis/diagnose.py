@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from lg_husky_sim.diagnosis import judge
 from lg_husky_sim.diagnosis.confidence import estimates
 from lg_husky_sim.diagnosis.doubts import is_guise
+from lg_husky_sim.diagnosis.encoders import as_read, is_momentary, read_otherwise
 from lg_husky_sim.diagnosis.events import event_words, what_happens
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.fits import Fit
@@ -137,7 +138,15 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         from lg_husky_sim.diagnosis.change import search_change
         found = search_change(whole, {r.name for r in baseline}, nominal, progress, workers)
     else:
-        found = search(whole, nominal.structure, nominal.parameters, progress, workers=workers)
+        progress('recalibration', 0.0)
+        whole, begin = as_read(whole, nominal.structure, nominal.parameters)
+        found = search(whole, nominal.structure, nominal.parameters, progress, start=begin,
+                       workers=workers)
+        other = read_otherwise(found)
+        if other is not None:
+            whole = other
+            found = search(whole, nominal.structure, nominal.parameters, progress,
+                           workers=workers)
     found = replace(found, final=ordered(found.final, whole.recordings))
     progress('numbers', 0.9)
     own = tuple(s for s in parts if s.recording in names)
@@ -168,7 +177,8 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
     culprit = names[0].subsystem if names else None
     listed = mismatches(whole, residual, whole.measured - best.solution.predicted, culprit)
     plain_out, augmented_out = held_out_errors(
-        found.plain, final, found.nominal, own, found.rounds[-1].metric)
+        found.plain, final, found.nominal, own, found.rounds[-1].metric,
+        is_momentary(whole))
     return Diagnosis(
         verdict, judge.confidence(found, verdict, unnamed), names,
         judge.indistinguishable(found), listed,
@@ -225,6 +235,9 @@ def _remaining(found: Search, unnamed: Unnamed | None) -> str:
 def _notes(found: Search, verdict: Verdict) -> tuple[str, ...]:
     bound = found.final.solution.at_bound
     notes = []
+    if is_momentary(found.observations):
+        notes.append('the wheel rates are read as those of the moment: this is nearer to the '
+                     'data than means over the time in which an encoder counts')
     if bound:
         notes.append('at the edge of what a recalibration may use up: ' + ', '.join(bound))
     if verdict is Verdict.KNOWN:

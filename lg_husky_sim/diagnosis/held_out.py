@@ -129,7 +129,8 @@ def refitted(fit: Fit, nominal: Parameters, train: Observations, metric: Metric)
 
 
 def held_out_errors(plain: Fit, final: Fit, nominal: Parameters, segments: Sequence[Segment],
-                    metric: Metric) -> tuple[dict[str, float], dict[str, float]]:
+                    metric: Metric, momentary: bool = False
+                    ) -> tuple[dict[str, float], dict[str, float]]:
     """
     Return the errors of both models on data that neither was fitted to.
 
@@ -140,6 +141,8 @@ def held_out_errors(plain: Fit, final: Fit, nominal: Parameters, segments: Seque
     nominal : Parameters
     segments : sequence of Segment
     metric : Metric
+    momentary : bool
+        Whether the wheel rates are those of the moment.
 
     Returns
     -------
@@ -151,7 +154,7 @@ def held_out_errors(plain: Fit, final: Fit, nominal: Parameters, segments: Seque
     train, test = split(segments)
     if not train or not test:
         return {}, {}
-    some = observations(train)
+    some = observations(train).read_as(momentary)
     pair = [errors(plant_of(refitted(fit, nominal, some, metric)), test)
             for fit in (plain, final)]
     return pair[0], pair[1]

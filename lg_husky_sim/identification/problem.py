@@ -10,7 +10,7 @@ physics that depends on heading, place or a wheel's angle acts where the robot r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -220,6 +220,10 @@ class Observations:
         names = self.recordings
         return plant.in_recording(recording, names[:names.index(plant.onset.recording)])
 
+    def read_as(self, momentary: bool) -> Observations:
+        """Return the observations with wheel rates of the moment, or as means over a while."""
+        return replace(self, pieces=tuple(replace(p, momentary=momentary) for p in self.pieces))
+
     def subset(self, keep: Sequence[bool]) -> Observations:
         """Return the observations of some of the pieces."""
         return Observations(tuple(p for p, k in zip(self.pieces, keep, strict=True) if k))
@@ -271,8 +275,10 @@ def _seen(channel: Channel, piece: Piece, grid: FloatArray, angle: FloatArray,
     if name in ('wheel_left', 'wheel_right'):
         late = sensors.delay_wheels + extra.get('delay_wheels', 0.0)
         factor = sensors.encoder_left if name == 'wheel_left' else sensors.encoder_right
-        angles = grid[:, _COLUMN[name.replace('wheel', 'angle')]]
         ends = channel.times - late
+        if piece.momentary:
+            return factor * sample(grid[:, _COLUMN[name]], start, ends)
+        angles = grid[:, _COLUMN[name.replace('wheel', 'angle')]]
         return factor * (sample(angles, start, ends) - sample(
             angles, start, ends - ENCODER_WINDOW)) / ENCODER_WINDOW
     if name == 'yaw_rate':
