@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import math
 
 from lg_husky_sim.diagnosis.fits import EVENT, Fit
+from lg_husky_sim.diagnosis.lost_commands import without_lost_commands
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.identification.noise import Metric, scales, spread
@@ -139,8 +140,13 @@ def what_happens(search: Search) -> dict[str, Moments]:
         Of its final fit; empty where nothing happens.
     """
     before, after = search.sides
-    found = moments(search.observations, search.final, None, after)
-    usual = moments(search.observations, search.final, None, before)
+    observations, final = search.observations, search.final
+    found = moments(observations, final, None, after)
+    if any(one.excess > MUCH for one in found.values()):
+        begins = {begin for one in found.values() for begin in one.begins}
+        found = moments(observations, without_lost_commands(observations, final, begins),
+                        {name: one.width for name, one in found.items()}, after)
+    usual = moments(observations, final, None, before)
     return {name: one for name, one in found.items() if len(one.begins) >= TIMES
             and one.excess > MUCH + BEFORE * (usual[name].excess if name in usual else 0.0)
             and (name not in usual or are_others(one, usual[name]))}

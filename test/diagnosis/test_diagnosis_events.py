@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 import re
 
+from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.candidates import candidates, effect_entries
 from lg_husky_sim.diagnosis.diagnose import diagnose
 from lg_husky_sim.diagnosis.events import (
@@ -32,7 +33,9 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.problem import observations
+from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Recording, segments
+from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
 
@@ -93,6 +96,26 @@ def test_one_late_command_is_chance(stalled: Callable[..., Recording], late: tup
     assert not what_happens(search)
     largest = max(one.excess for one in moments(search.observations, search.plain).values())
     assert (largest > 0.05) == bool(late)
+
+
+def test_lost_messages_are_no_physics(steps: Steps, plant: Plant) -> None:
+    """The robot does for one interval what it did before, and the bag says otherwise."""
+    script = Manoeuvre('sparse', tuple(Step(*step, 0.0) for step in steps), rate=10.0)
+    told = script.commands()
+    changed = np.flatnonzero(np.any(np.diff(told.values, axis=0), axis=1)) + 1
+    heard = TimeSeries(np.delete(told.times, changed[1:6]),
+                       np.delete(told.values, changed[1:6], axis=0), told.names)
+    streams, rng = simulate_commands(plant, heard, 1.0), np.random.default_rng(3)
+    seen = {name: TimeSeries(series.times, series.values + 0.02 * rng.standard_normal(
+        series.values.shape), series.names) for name, series in streams.items()
+        if name in ('wheels', 'imu', 'pose')}
+    recording = Recording('rec', 'rec', {**seen, 'command': told}, 0,
+                          frames=('odom', 'base_link'))
+    search = looked_at([recording])
+    held = moments(search.observations, search.final)
+    assert all(held[name].excess > 1.0 for name in ('wheel_left', 'wheel_right'))
+    assert all(len(held[name].begins) >= 3 for name in ('wheel_left', 'wheel_right'))
+    assert not what_happens(search)
 
 
 def test_one_wheel_alone_is_its_drivetrain(stalled: Callable[..., Recording]) -> None:
