@@ -11,7 +11,7 @@ import math
 from lg_husky_sim.diagnosis.candidates import Candidate
 from lg_husky_sim.diagnosis.evidence import energy, held_out_cost, instability, strain
 from lg_husky_sim.diagnosis.fits import at_nominal, Fit, fit_structure, shared_metric
-from lg_husky_sim.diagnosis.jitter import gains_beside_jitter
+from lg_husky_sim.diagnosis.jitter import gains_beside_jitter, JITTER
 from lg_husky_sim.diagnosis.onsets import Onsets
 from lg_husky_sim.diagnosis.refits import look, Looked, Refit, run_refit
 from lg_husky_sim.diagnosis.rivals import (
@@ -37,6 +37,8 @@ from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
+#: Sizes below which a dead time or a late stamp is no physics [s]: deviation of a command's time.
+SLIGHT = {'latency': JITTER, 'stamp_delay': JITTER}
 #: Candidates that are refitted in a round.
 SERIOUS = 6
 #: Of these, those that are refitted to the end.
@@ -150,7 +152,8 @@ def play_round(observations: Observations, base: Fit, number: int, nominal: Para
         Refit(observations, base, nominal, lean[k], common, POLISH, fit)
         for k, fit in near])
     fits = [(serious[k], fit) for (k, _), fit in zip(near, polished, strict=True)]
-    usable = [(score, fit) for score, fit in fits if fit is not None and not is_eased(fit)]
+    usable = [(score, fit) for score, fit in fits
+              if fit is not None and not is_eased(fit) and not is_slight(fit)]
     rebased = fit_structure(observations, base.structure, nominal, common,
                             base.solution.values, base.parameters) or base
     if usable:
@@ -194,6 +197,14 @@ def play_round(observations: Observations, base: Fit, number: int, nominal: Para
     adopted = (rivals[0].held_out > LEAST_GAIN[0] and unstable < UNSTABLE[0] and share > 0.0
                if eager else adopts(rivals[0], share, unstable, rest, number, only_late))
     return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted, unstable, rest)
+
+
+def is_slight(fit: Fit) -> bool:
+    """Return whether all that the newest effect does is shift stamps by what jitter does, too."""
+    effect = fit.structure.effects[-1]
+    return not effect.again and all(
+        abs(fit.parameters[p.name]) < SLIGHT.get(p.name, 0.0)
+        for p in effect.parameters() if not p.fixed)
 
 
 def is_eased(fit: Fit) -> bool:

@@ -13,7 +13,7 @@ from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate, shared_
 from lg_husky_sim.diagnosis.judge import is_unnamed
 from lg_husky_sim.diagnosis.refits import between, refit
 from lg_husky_sim.diagnosis.rivals import adopts, most_credible, rank, Rival
-from lg_husky_sim.diagnosis.rounds import left_by, play_round, Round, settled
+from lg_husky_sim.diagnosis.rounds import is_slight, left_by, play_round, Round, settled
 from lg_husky_sim.diagnosis.screening import Score, Signature
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.shortlist import always
@@ -138,6 +138,19 @@ def test_a_heavy_load_strains_the_recalibration_of_a_light_robot(
     (best,) = one.rivals
     assert best.relief > 4.0
     assert 15.0 < best.fit.parameters['payload_mass'] < 35.0
+
+
+@pytest.mark.parametrize(('effect', 'sizes', 'slight'), [
+    (Effect('sensor_time_offset', shape='wheels'), {'stamp_delay': -0.005}, True),
+    (Effect('sensor_time_offset', shape='wheels'), {'stamp_delay': -0.03}, False),
+    (Effect('command_latency'), {'latency': 0.004}, True),
+    (Effect('command_latency'), {'latency': 0.02}, False),
+    (PAYLOAD, {'payload_mass': 0.1, 'payload_inertia': 0.0}, False)])
+def test_stamps_that_are_off_by_less_than_jitter_are_no_physics(
+        effect: Effect, sizes: dict[str, float], slight: bool, base: Fit) -> None:
+    fit = replace(base, structure=base.structure.with_effect(effect),
+                  parameters=base.parameters.with_entries(*effect_entries(effect, sizes)))
+    assert is_slight(fit) is slight
 
 
 def test_held_out_data_gain_no_more_than_is_credible() -> None:
