@@ -18,8 +18,9 @@ from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.problem import Observations
 
-#: Gain from which rates are taken for something else [nats].
-CLEARLY = 40.0
+#: Gain from which rates are taken for those of the moment [nats]: before and after something was
+#: found, which the other reading may have led to.
+CLEARLY, STILL = 40.0, 100.0
 
 
 def is_momentary(observations: Observations) -> bool:
@@ -69,7 +70,8 @@ def read_otherwise(search: Search) -> Observations | None:
     Returns
     -------
     Observations or None
-        None where nothing speaks clearly against how the rates were read.
+        None where nothing speaks against how the rates were read: against means clearly, against
+        rates of the moment at all.
     """
     observations, final, metric = search.observations, search.final, search.rounds[-1].metric
     if final is search.plain or not {'wheel_left', 'wheel_right'} & set(observations.channels):
@@ -80,4 +82,4 @@ def read_otherwise(search: Search) -> Observations | None:
     if again is None:
         return None
     gain = left_by(observations, final, metric) - left_by(other, again, metric)
-    return other if gain > CLEARLY else None
+    return other if gain > (0.0 if is_momentary(observations) else STILL) else None

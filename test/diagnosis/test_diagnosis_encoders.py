@@ -70,9 +70,11 @@ def test_without_wheels_there_is_nothing_to_read(counted: Recording) -> None:
     assert as_read(given, model.structure, model.parameters)[0] is given
 
 
-@pytest.mark.parametrize('wrongly', [False, True])
-def test_what_was_found_says_how_rates_are_read(momentary: Recording, wrongly: bool) -> None:
-    model, given = load_model(), observations(segments(momentary)).read_as(not wrongly)
+@pytest.mark.parametrize(('of_moment', 'wrongly'), [(True, False), (True, True), (False, True)])
+def test_what_was_found_says_how_rates_are_read(
+        momentary: Recording, counted: Recording, of_moment: bool, wrongly: bool) -> None:
+    model, recording = load_model(), momentary if of_moment else counted
+    given = observations(segments(recording)).read_as(of_moment is not wrongly)
     plain = recalibrate(given, model.structure, model.parameters)
     metric = first_metric(given, plain.solution.predicted)
     nominal = {name: model.parameters[name] for name in model.parameters}
@@ -83,7 +85,7 @@ def test_what_was_found_says_how_rates_are_read(momentary: Recording, wrongly: b
     adopted = Round(plain, (), (), metric, 0.0, True)
     other = read_otherwise(Search(given, plain, final, (adopted,), model.parameters))
     assert (other is not None) is wrongly
-    assert other is None or is_momentary(other)
+    assert other is None or is_momentary(other) is of_moment
     assert read_otherwise(Search(given, plain, plain, (adopted,), model.parameters)) is None
 
 
