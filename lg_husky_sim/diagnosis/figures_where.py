@@ -90,6 +90,8 @@ def where_figure(located: Located, culprits: Collection[str], onset: Onset | Non
                     onset.recording in ('', name)):
                 for each in (upper, lower):
                     each.axvline(onset.value, color='#0072b2', linewidth=1.5, linestyle='--')
+            # A line in another segment must not make room for itself here.
+            upper.set_xlim(edges[0], edges[-1])
         axes[1, (len(pieces) - 1) // 2].set_xlabel('time [s]')
         bar = figure.colorbar(image, ax=axes[0, :], pad=0.01)
         bar.set_label('explained [nats/s]')
