@@ -7,9 +7,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from lg_husky_sim.cli.several import SeveralWords
 
 
-@click.command(short_help='Replay recordings through models; figures and errors.')
+@click.command(cls=SeveralWords,
+               short_help='Replay recordings through models; figures and errors.')
 @click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]')
 @click.option('--model', 'models', multiple=True, type=click.Path(path_type=Path),
               metavar='FILE.yaml',
@@ -20,7 +22,7 @@ import click
 @click.option('--rival', 'rivals', multiple=True, metavar='BAG',
               help='A recording of the same drive by another simulator, one for each REC in '
                    'their order, to stand beside the models.')
-@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE',
+@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
               help='Override a physical parameter of every model; may be given several times.')
 @click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
               help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).')
@@ -47,7 +49,7 @@ def command(
     from lg_husky_sim.errors import CommandError
     from lg_husky_sim.folders import check_folder, result_folder
     from lg_husky_sim.husky.model_file import parse_settings
-    from lg_husky_sim.recording import read_recording, TopicMap
+    from lg_husky_sim.recording import named_apart, read_recording, TopicMap
     from tqdm import tqdm
 
     check_extras()
@@ -60,8 +62,8 @@ def command(
     overridden = parse_settings(settings)
     plants = load_plants(models, overridden)
     choice = TopicMap.parse(topics)
-    read = [read_recording(path, choice) for path in tqdm(
-        recordings, desc='reading', unit='recording', disable=None, leave=False)]
+    read, = named_apart([read_recording(path, choice) for path in tqdm(
+        recordings, desc='reading', unit='recording', disable=None, leave=False)])
     names = [recording.name for recording in read]
     outcomes = []
     for place, recording in enumerate(tqdm(read, desc='replaying', unit='recording',

@@ -8,20 +8,22 @@ import os
 from pathlib import Path
 
 import click
+from lg_husky_sim.cli.several import SeveralWords
 
 
-@click.command(short_help='Find the physics that a model lacks; report and augmented model.')
+@click.command(cls=SeveralWords,
+               short_help='Find the physics that a model lacks; report and augmented model.')
 @click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]')
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='DIR',
               help='Folder for diagnosis.json, model.yaml, report.html and the pictures.')
-@click.option('--baseline', 'baselines', multiple=True, metavar='REC',
-              help='Recording of the same robot before a change; then the question is what '
-                   'changed. May be given several times.')
+@click.option('--baseline', 'baselines', multiple=True, metavar='REC [REC …]',
+              help='Recordings of the same robot before a change; then the question is what '
+                   'changed. Give the recordings after it first.')
 @click.option('--robot', '--model', 'robot', type=click.Path(path_type=Path),
               metavar='FILE.yaml',
               help="Model in doubt; the Husky with the paper's parameters by default.")
-@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE',
-              help='Override a physical parameter; may be given several times.')
+@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
+              help='Override physical parameters.')
 @click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
               help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).')
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,

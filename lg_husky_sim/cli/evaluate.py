@@ -7,9 +7,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from lg_husky_sim.cli.several import SeveralWords
 
 
-@click.command(short_help="The paper's evaluation: calibrate, hold out, six numbers, Figs. 12-16.")
+@click.command(cls=SeveralWords,
+               short_help="The paper's evaluation: calibrate, hold out, six numbers, Figs. 12-16.")
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='DIR',
               help='Folder for index.html, evaluation.json, evaluation.txt and the pictures.')
 @click.option('--case', 'cases', multiple=True, type=click.Choice(['synthetic', 'engine']),
@@ -18,18 +20,18 @@ import click
                    'given.')
 @click.option('--calibrate', multiple=True, metavar='REC',
               help='A recording to calibrate on, such as a circle.')
-@click.option('--held-out', multiple=True, metavar='REC',
+@click.option('--held-out', multiple=True, metavar='REC [REC …]',
               help='A recording to predict; may be given several times.')
-@click.option('--rival', 'rivals', multiple=True, metavar='BAG',
+@click.option('--rival', 'rivals', multiple=True, metavar='BAG [BAG …]',
               help="Another simulator's recording of the same drive, one for each recording in "
                    'their order.')
-@click.option('--steps', 'steps', multiple=True, metavar='REC',
+@click.option('--steps', 'steps', multiple=True, metavar='REC [REC …]',
               help='A recording of commanded steps: fit every other step, predict the rest, '
                    'beside three simple models; may be given several times.')
 @click.option('--model', type=click.Path(path_type=Path), metavar='FILE.yaml',
               help="Model to start from; the Husky with the paper's parameters by default.")
-@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE',
-              help='Override a physical parameter; may be given several times.')
+@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
+              help='Override physical parameters.')
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
               help='Seed of all chance: starts, genes, noise.')
 @click.option('--starts', type=click.IntRange(min=1), default=6, show_default=True,

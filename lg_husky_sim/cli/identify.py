@@ -7,17 +7,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from lg_husky_sim.cli.several import SeveralWords
 
 
-@click.command(short_help='Estimate parameters from recordings; a model file and a report.')
+@click.command(cls=SeveralWords,
+               short_help='Estimate parameters from recordings; a model file and a report.')
 @click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]')
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='FILE.yaml',
               help='Model file to write; the report stands beside it as .txt, .json and .html. '
                    'With --each a folder that gets these files for every recording.')
 @click.option('--model', type=click.Path(path_type=Path), metavar='FILE.yaml',
               help="Model to start from; the Husky with the paper's parameters by default.")
-@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE',
-              help='Override a physical parameter; may be given several times.')
+@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
+              help='Override physical parameters.')
 @click.option('--free', multiple=True, metavar='NAMES',
               help='Parameters to estimate, separated by commas; by default those that the model '
                    'marks as free, and the numbers of its effects.')

@@ -7,9 +7,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from lg_husky_sim.cli.several import SeveralWords
 
 
-@click.command(short_help='Play a recording into the ROS graph.')
+@click.command(cls=SeveralWords,
+               short_help='Play a recording into the ROS graph.')
 @click.argument('recording', type=click.Path(path_type=Path), metavar='REC')
 @click.option('--preset', default='paper', show_default=True,
               help='Names and types to send under: paper, husky_ros1 or clearpath_jazzy.')

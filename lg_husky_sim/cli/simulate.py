@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from lg_husky_sim.cli.several import SeveralWords
 
 if TYPE_CHECKING:
     from lg_husky_sim.recording import TopicMap
     from lg_husky_sim.signals import TimeSeries
 
 
-@click.command(short_help='Drive a model with commands; write a rosbag2.')
+@click.command(cls=SeveralWords,
+               short_help='Drive a model with commands; write a rosbag2.')
 @click.option('--model', 'model', type=click.Path(path_type=Path), metavar='FILE.yaml',
               help="Model file; the Husky with the paper's parameters by default.")
 @click.option('--commands', required=True, metavar='REC|SCRIPT.yaml|NAME',
@@ -26,8 +28,8 @@ if TYPE_CHECKING:
               show_default=True, help='Storage of the rosbag2.')
 @click.option('--rate', type=float, metavar='HZ',
               help="Samples per second; by default a recording's own stamps, else 50.")
-@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE',
-              help='Override a physical parameter; may be given several times.')
+@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
+              help='Override physical parameters.')
 @click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
               help='Choose a topic or frame of the recording by hand (command=/cmd_vel, …).')
 @click.option('--overwrite', is_flag=True, help='Replace a rosbag2 that is at BAG.')

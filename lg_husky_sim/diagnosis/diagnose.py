@@ -22,11 +22,10 @@ from lg_husky_sim.diagnosis.result import Diagnosis, Finding, Verdict
 from lg_husky_sim.diagnosis.search import Progress, Search, search
 from lg_husky_sim.diagnosis.unnamed import described, look_for_unnamed, Unnamed
 from lg_husky_sim.diagnosis.workers import HERE, Workers
-from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.identification.problem import Observations, observations
-from lg_husky_sim.recording import Recording, Segment, segments
+from lg_husky_sim.recording import named_apart, Recording, Segment, segments
 import numpy as np
 
 #: Part of what a smooth effort gains that a guise must add to stay in the model beside it.
@@ -59,16 +58,9 @@ def usable_segments(recordings: Sequence[Recording]) -> tuple[Segment, ...]:
 
     Raises
     ------
-    DiagnosisError
-        If two recordings have the same name.
     RecordingError
         If one has no commands.
     """
-    names = [r.name for r in recordings]
-    for name in names:
-        if names.count(name) > 1:
-            raise DiagnosisError(
-                f'two recordings are called {name!r}; rename one, since results go by name')
     for recording in recordings:
         recording.stream('command')
     return tuple(s for r in recordings for s in segments(r))
@@ -126,10 +118,11 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     Raises
     ------
     RecordingError
-        If a recording cannot be used.
+        If a recording cannot be used or is given twice.
     DiagnosisError
-        If names collide, or wheels turn faster than any do.
+        If wheels turn faster than any do.
     """
+    recordings, baseline = named_apart(recordings, baseline)
     parts = usable_segments([*baseline, *recordings])
     whole = observations(parts)
     check_wheel_rates(whole, nominal)

@@ -14,7 +14,7 @@ from lg_husky_sim.evaluation.engine import drive, engine_config, engine_robot
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.manoeuvres import find_manoeuvre
-from lg_husky_sim.recording import read_recording, Recording, TopicMap
+from lg_husky_sim.recording import named_apart, read_recording, Recording, TopicMap
 from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.simulation import rollout
 import numpy as np
@@ -119,9 +119,9 @@ def recorded_case(calibrate: Sequence[str], held_out: Sequence[str], rivals: Seq
     Raises
     ------
     CommandError
-        If the numbers do not agree, or two recordings have one name.
+        If the numbers do not agree.
     RecordingError
-        If one cannot be read.
+        If one cannot be read or is given twice.
     """
     if len(calibrate) != 1:
         raise CommandError(f'{len(calibrate)} recordings to calibrate on; give exactly one')
@@ -129,10 +129,8 @@ def recorded_case(calibrate: Sequence[str], held_out: Sequence[str], rivals: Seq
     if rivals and len(rivals) != len(paths):
         raise CommandError(f'{len(rivals)} rivals for {len(paths)} recordings: give one for each '
                            'recording, in their order, or none')
-    read = [read_recording(path, topics) for path in paths]
+    read, = named_apart([read_recording(path, topics) for path in paths])
     names = [recording.name for recording in read]
-    if len(set(names)) != len(names):
-        raise CommandError(f'two recordings have one name: {", ".join(names)}')
     others = {name: read_recording(path) for name, path in zip(names, rivals, strict=False)}
     return Case('recorded', 'recordings', dict(zip(names, read, strict=True)), others, 'rival')
 

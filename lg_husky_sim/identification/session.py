@@ -8,13 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from lg_husky_sim.errors import RecordingError, SettingsError
+from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.estimate import estimate, STARTS
 from lg_husky_sim.identification.executor import run_tasks
 from lg_husky_sim.identification.report import write_fit
 from lg_husky_sim.identification.result import FitResult, Method
-from lg_husky_sim.recording import read_recording, Segment, segments, TopicMap
+from lg_husky_sim.recording import named_apart, read_recording, Segment, segments, TopicMap
 
 
 @dataclass(frozen=True)
@@ -52,18 +52,10 @@ def read_segments(paths: Sequence[str], topics: TopicMap | None = None) -> list[
     Raises
     ------
     RecordingError
-        If a recording cannot be read, or two have one name.
+        If a recording cannot be read or is given twice.
     """
-    found: list[Segment] = []
-    names: dict[str, str] = {}
-    for path in paths:
-        recording = read_recording(path, topics)
-        if recording.name in names:
-            raise RecordingError(f'{path} and {names[recording.name]} are both named '
-                                 f'{recording.name}; rename one')
-        names[recording.name] = path
-        found.extend(segments(recording))
-    return found
+    read, = named_apart([read_recording(path, topics) for path in paths])
+    return [segment for recording in read for segment in segments(recording)]
 
 
 def _fit(request: Request, parts: Sequence[Segment], jobs: int, scheduler: str | None,

@@ -6,6 +6,7 @@ Recordings: ROS bags read into time series, and written from them.
 Reads rosbag2 (MCAP, sqlite3) and ROS 1 bags without ROS, by way of the library `rosbags`.
 """
 
+from lg_husky_sim.recording.names import named_apart
 from lg_husky_sim.recording.reader import read_recording
 from lg_husky_sim.recording.recording import Recording, Segment, segments, windows
 from lg_husky_sim.recording.topics import TopicMap
@@ -15,6 +16,7 @@ __all__ = [
     'Recording',
     'Segment',
     'TopicMap',
+    'named_apart',
     'read_recording',
     'segments',
     'windows',

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from lg_husky_sim.diagnosis.diagnose import Case, diagnose
 from lg_husky_sim.diagnosis.locate import fingerprints, locate, subsystem_strengths
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.errors import DiagnosisError, RecordingError
+from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -89,9 +89,9 @@ def test_missing_force_has_its_size_in_newtons(diagnosed: Callable[[str], Case])
     assert max(mark.share for mark in fingerprints(located)) > 0.3
 
 
-def test_two_recordings_of_one_name_are_refused(drive: Callable[..., Recording]) -> None:
+def test_a_recording_given_twice_is_refused(drive: Callable[..., Recording]) -> None:
     one = drive('same', 'nothing', 1)
-    with pytest.raises(DiagnosisError, match="two recordings are called 'same'"):
+    with pytest.raises(RecordingError, match='same is given twice'):
         diagnose([one, one], load_model(), lambda text, share: None)
 
 

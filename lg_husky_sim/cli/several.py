@@ -1,0 +1,72 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Options that take one word or several.
+
+`--baseline a b c` says the same as `--baseline a --baseline b --baseline c`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import re
+
+import click
+
+#: What an option of settings can take: a name, then its value.
+SETTING = re.compile(r'[A-Za-z_][\w.]*=')
+
+
+class SeveralWords(click.Command):
+    """
+    A command of which some repeatable options also take several words after one flag.
+
+    Those with a ``=`` in their metavar go on as long as words look like settings; those with a
+    ``…`` up to the next option, unless nothing would be left for the command's own arguments:
+    then one word belongs to each flag.
+    """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        words, arguments = self._spelt_out(args, True)
+        if not arguments:
+            words, _ = self._spelt_out(args, False)
+        return super().parse_args(ctx, words)
+
+    def _spelt_out(self, args: list[str], greedy: bool) -> tuple[list[str], int]:
+        # The words with a flag before each value, and how many belong to no option.
+        options = {name: one for one in self.params if isinstance(one, click.Option)
+                   for name in (*one.opts, *one.secondary_opts)}
+        words: list[str] = []
+        arguments = 0
+        rest = iter(args)
+        for word in rest:
+            words.append(word)
+            option = options.get(word)
+            if word == '--':
+                behind = list(rest)
+                arguments += len(behind)
+                words += behind
+            elif option is not None and not (option.is_flag or option.count):
+                words += _first(rest)
+            elif not word.startswith('-'):
+                several = _owner(words[:-1], options, word, greedy)
+                if several is None:
+                    arguments += 1
+                else:
+                    words[-1:] = [several, word]
+        return words, arguments
+
+
+def _first(rest: Iterator[str]) -> list[str]:
+    word = next(rest, None)
+    return [] if word is None else [word]
+
+
+def _owner(before: list[str], options: dict[str, click.Option], word: str, greedy: bool
+           ) -> str | None:
+    # The flag of a repeatable option whose value stands just before this word.
+    if len(before) < 2 or (option := options.get(before[-2])) is None or not option.multiple:
+        return None
+    shown = option.metavar or ''
+    mine = SETTING.match(word) if '=' in shown else greedy and '…' in shown
+    return before[-2] if mine else None

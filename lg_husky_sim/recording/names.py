@@ -1,0 +1,66 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Names of recordings read together: results go by name, and bags are called alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+import os
+from pathlib import PurePath
+
+from lg_husky_sim.errors import RecordingError
+from lg_husky_sim.recording.recording import Recording
+
+
+def named_apart(*groups: Sequence[Recording]) -> tuple[tuple[Recording, ...], ...]:
+    """
+    Return recordings of which no two have one name.
+
+    Parameters
+    ----------
+    *groups : sequence of Recording
+        The first keeps its names where they differ among themselves; a later one may not use
+        them again.
+
+    Returns
+    -------
+    tuple of tuple of Recording
+        The groups; in front of names that are not enough stand the folders that make them
+        differ, as in ``before/drive``.
+
+    Raises
+    ------
+    RecordingError
+        If a recording is given twice.
+    """
+    places = [_ladder(recording)[-1] for group in groups for recording in group]
+    for place in places:
+        if places.count(place) > 1:
+            raise RecordingError(f'recording /{place} is given twice')
+    taken: set[str] = set()
+    found = []
+    for group in groups:
+        names = _apart(group, taken)
+        taken.update(names)
+        found.append(tuple(
+            recording if name == recording.name else replace(recording, name=name)
+            for recording, name in zip(group, names, strict=True)))
+    return tuple(found)
+
+
+def _apart(group: Sequence[Recording], taken: set[str]) -> list[str]:
+    # Each with as few folders as tell it from the others and from what is taken.
+    ladders = [_ladder(recording) for recording in group]
+    names = []
+    for number, ladder in enumerate(ladders):
+        others = set(taken).union(*(one for k, one in enumerate(ladders) if k != number))
+        names.append(next(one for one in ladder if one not in others))
+    return names
+
+
+def _ladder(recording: Recording) -> list[str]:
+    # The name alone, then with more and more of the folders in which the recording lies.
+    folders = PurePath(os.path.abspath(recording.path)).parent.parts[1:]
+    return [recording.name, *('/'.join((*folders[-count:], recording.name))
+                              for count in range(1, len(folders) + 1))]
