@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Folders of results that appear whole or not at all."""
+"""Folders of results that appear whole or not at all, beside whatever else lies there."""
 
 from __future__ import annotations
 
@@ -8,34 +8,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from os import replace
 from pathlib import Path
+import shutil
 import tempfile
 
 from lg_husky_sim.errors import SettingsError
 
 
-def check_folder(path: Path, marker: str) -> None:
+def check_folder(path: Path) -> None:
     """
     Check that results may be written to a folder.
 
     Parameters
     ----------
     path : pathlib.Path
-        Does not exist, is empty, or holds results of the same kind.
-    marker : str
-        Name of a file that every folder of this kind holds, such as ``compare.json``.
+        Does not exist or is a folder.
 
     Raises
     ------
     SettingsError
         If something else is there.
     """
-    if not path.exists() and not path.is_symlink():
-        return
-    if not path.is_dir():
+    if (path.exists() or path.is_symlink()) and not path.is_dir():
         raise SettingsError(f'{path} exists and is no folder; choose another name')
-    if any(path.iterdir()) and not (path / marker).is_file():
-        raise SettingsError(
-            f'{path} is not empty and holds no {marker} of an earlier run; choose another folder')
 
 
 @contextmanager
@@ -46,29 +40,62 @@ def result_folder(path: Path, marker: str) -> Iterator[Path]:
     Parameters
     ----------
     path : pathlib.Path
-        Where it shall be; results of the same kind that are there are replaced at the end.
+        Where it shall be. Results of an earlier run are replaced at the end; other files stay,
+        and one that has the name of a result gets a ``~`` behind its own.
     marker : str
-        As in `check_folder`; the caller writes this file too.
+        Name of the file that is there only if all others are, such as ``compare.json``; the
+        caller writes it too.
 
     Yields
     ------
     pathlib.Path
-        A scratch folder beside it to write to; it becomes `path` when the block ends without
-        an exception, and is removed otherwise.
+        A scratch folder beside it to write to; what is in it becomes the results when the block
+        ends without an exception, and is removed otherwise.
 
     Raises
     ------
     SettingsError
-        If something else is at `path`.
+        If `path` is something else than a folder.
     """
     target = path.resolve()
-    check_folder(target, marker)
+    check_folder(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=target.parent) as scratch:
         made = Path(scratch) / 'made'
         made.mkdir()
         yield made
-        check_folder(target, marker)
+        check_folder(target)
+        names = sorted((one.name for one in made.iterdir()), key=lambda name: name == marker)
+        (made / _list_of(marker)).write_text(''.join(f'{name}\n' for name in names))
         if target.exists():
-            replace(target, Path(scratch) / 'previous')
-        replace(made, target)
+            _install(made, target, [_list_of(marker), *names])
+        else:
+            replace(made, target)
+
+
+def _list_of(marker: str) -> str:
+    # What an earlier run wrote, so that the next one replaces that and nothing else.
+    return f'.{marker}.files'
+
+
+def _install(made: Path, target: Path, names: list[str]) -> None:
+    # The list comes first and the marker last: without it, nobody takes the rest for results.
+    listed = target / names[0]
+    there = {one.name for one in target.iterdir()}
+    mine = there & {names[0], *(listed.read_text().splitlines() if listed.is_file() else ())}
+    for name in mine - set(names[:-1]):
+        _remove(target / name)
+    for name in names:
+        old, new = target / name, made / name
+        if name in there - mine:
+            replace(old, old.with_name(f'{name}~'))
+        elif name in mine and (old.is_dir() or new.is_dir()):
+            _remove(old)
+        replace(new, old)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

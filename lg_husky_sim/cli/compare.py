@@ -53,7 +53,7 @@ def command(
     from tqdm import tqdm
 
     check_extras()
-    check_folder(out, MARKER)
+    check_folder(out)
     if not 0.0 <= horizon < float('inf'):
         raise CommandError(f'--horizon {horizon:g} s must be 0 or positive')
     if rivals and len(rivals) != len(recordings):

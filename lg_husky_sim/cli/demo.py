@@ -35,7 +35,7 @@ def command(out: Path, manoeuvre: str, model: str) -> None:
 
     require('rosbags', 'write recordings')
     require('matplotlib', 'draw pictures')
-    check_folder(out, MARKER)
+    check_folder(out)
     script = find_manoeuvre(manoeuvre)
     settings = make_settings()
     from lg_husky_sim.ros.demo import isolate, run_demo

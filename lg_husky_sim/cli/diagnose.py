@@ -58,7 +58,7 @@ def command(
     from tqdm import tqdm
 
     del seed
-    check_folder(out, MARKER)
+    check_folder(out)
     if with_report:
         check_extras()
     model = apply_settings(load_model(robot), parse_settings(settings))

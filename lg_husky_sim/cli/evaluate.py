@@ -61,7 +61,7 @@ def command(
     from tqdm import tqdm
 
     check_extras()
-    check_folder(out, MARKER)
+    check_folder(out)
     if (held_out or rivals) and not calibrate:
         raise CommandError('--held-out and --rival need --calibrate REC')
     chosen = cases or (() if calibrate or steps else ('synthetic', 'engine'))
