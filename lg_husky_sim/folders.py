@@ -21,7 +21,7 @@ def check_folder(path: Path) -> None:
     Parameters
     ----------
     path : pathlib.Path
-        Does not exist or is a folder.
+        Does not exist or is a folder, but no recording.
 
     Raises
     ------
@@ -30,6 +30,8 @@ def check_folder(path: Path) -> None:
     """
     if (path.exists() or path.is_symlink()) and not path.is_dir():
         raise SettingsError(f'{path} exists and is no folder; choose another name')
+    if (path / 'metadata.yaml').is_file():
+        raise SettingsError(f'{path} is a recording; choose another folder for the results')
 
 
 @contextmanager
@@ -55,7 +57,7 @@ def result_folder(path: Path, marker: str) -> Iterator[Path]:
     Raises
     ------
     SettingsError
-        If `path` is something else than a folder.
+        If something else is at `path`, or a recording.
     """
     target = path.resolve()
     check_folder(target)

@@ -21,7 +21,8 @@ def test_results_appear_and_are_replaced(tmp_path: Path) -> None:
     out = tmp_path / 'deep' / 'out'
     _fill(out, 'first.png')
     _fill(out, 'second.png', 'y')
-    assert {path.name for path in out.iterdir()} == {'result.json', 'second.png'}
+    assert {path.name for path in out.iterdir()} == {
+        'result.json', 'second.png', '.result.json.files'}
     assert (out / 'result.json').read_text() == 'y'
     assert [path.name for path in out.parent.iterdir()] == ['out']
 
@@ -47,12 +48,58 @@ def test_a_failure_keeps_the_old_results(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ['out']
 
 
-def test_what_is_not_ours_is_not_touched(tmp_path: Path) -> None:
-    (tmp_path / 'thesis').mkdir()
-    (tmp_path / 'thesis' / 'thesis.tex').write_text('mine')
-    with pytest.raises(SettingsError, match='thesis is not empty and holds no result'):
-        _fill(tmp_path / 'thesis', 'a')
+def test_what_is_not_ours_stays(tmp_path: Path) -> None:
+    out = tmp_path / 'thesis'
+    (out / 'chapter').mkdir(parents=True)
+    (out / 'thesis.tex').write_text('mine')
+    (out / 'chapter' / 'one.tex').write_text('mine')
+    (out / 'a').write_text('mine too')
+    for content in ('first', 'second'):
+        _fill(out, 'a', content)
+        assert (out / 'thesis.tex').read_text() == 'mine'
+        assert (out / 'chapter' / 'one.tex').read_text() == 'mine'
+        assert (out / 'a').read_text() == content
+        assert (out / 'a~').read_text() == 'mine too'
+    _fill(out, 'b')
+    assert {path.name for path in out.iterdir() if not path.name.startswith('.')} == {
+        'thesis.tex', 'chapter', 'a~', 'b', 'result.json'}
+
+
+def test_an_open_log_in_the_folder_goes_on(tmp_path: Path) -> None:
+    out = tmp_path / 'out'
+    out.mkdir()
+    with (out / 'log.txt').open('w') as log:
+        log.write('before ')
+        _fill(out, 'a')
+        log.write('after')
+    assert (out / 'log.txt').read_text() == 'before after'
+
+
+def test_a_folder_among_the_results_is_replaced_whole(tmp_path: Path) -> None:
+    for name in ('one', 'two'):
+        with result_folder(tmp_path / 'out', 'result.json') as folder:
+            (folder / 'result.json').write_text(name)
+            (folder / 'parts').mkdir()
+            (folder / 'parts' / name).write_text('x')
+    assert [path.name for path in (tmp_path / 'out' / 'parts').iterdir()] == ['two']
+
+
+def test_a_list_of_results_reaches_no_farther_than_its_folder(tmp_path: Path) -> None:
+    out = tmp_path / 'out'
+    _fill(out, 'a')
+    (tmp_path / 'near').write_text('mine')
+    (out / '.result.json.files').write_text('../near\n..\n.\n\na\n')
+    _fill(out, 'b')
+    assert (tmp_path / 'near').read_text() == 'mine'
+    assert not (out / 'a').exists()
+
+
+def test_results_go_into_no_file_and_no_recording(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('mine')
     with pytest.raises(SettingsError, match='file exists and is no folder'):
-        check_folder(tmp_path / 'file', 'result.json')
-    assert (tmp_path / 'thesis' / 'thesis.tex').read_text() == 'mine'
+        check_folder(tmp_path / 'file')
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'metadata.yaml').write_text('mine')
+    with pytest.raises(SettingsError, match='bag is a recording'):
+        _fill(tmp_path / 'bag', 'a')
+    assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['metadata.yaml']

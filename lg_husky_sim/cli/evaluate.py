@@ -53,7 +53,7 @@ def command(
     every other step is fitted, the rest is predicted.
     """
     from lg_husky_sim.errors import CommandError
-    from lg_husky_sim.evaluation.session import MARKER, Request, run_evaluation
+    from lg_husky_sim.evaluation.session import Request, run_evaluation
     from lg_husky_sim.folders import check_folder
     from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
     from lg_husky_sim.identification.pages import check_extras

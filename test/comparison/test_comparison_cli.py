@@ -155,7 +155,7 @@ def test_compare_models_and_a_rival(bag: Path, capsys: Any) -> None:
     assert (out / 'compare.txt').read_text().strip() in printed
     names = {path.name for path in out.iterdir()}
     assert names == {'compare.json', 'compare.txt', 'index.html', '01_turn_01_responses.png',
-                     '01_turn_01_trajectory.png'}
+                     '01_turn_01_trajectory.png', '.compare.json.files'}
 
 
 def test_the_page_is_self_contained_and_escaped(bag: Path) -> None:
@@ -173,14 +173,18 @@ def test_the_page_is_self_contained_and_escaped(bag: Path) -> None:
 
 def test_compare_replaces_its_own_results_only(bag: Path, capsys: Any) -> None:
     out = bag.parent / 'result'
+    assert run(['compare', str(bag), '--out', str(out), '--figures', '1']) == 0
+    pictures = list(out.glob('*.png'))
+    assert pictures
+    (out / 'mine.png').write_bytes(b'kept')
     assert run(['compare', str(bag), '--out', str(out), '--figures', '0']) == 0
-    (out / 'stale.png').write_bytes(b'')
-    assert run(['compare', str(bag), '--out', str(out), '--figures', '0']) == 0
-    assert not (out / 'stale.png').exists()
+    assert not any(picture.exists() for picture in pictures)
+    assert (out / 'mine.png').read_bytes() == b'kept'
     capsys.readouterr()
+    before = sorted(bag.iterdir())
     assert run(['compare', str(bag), '--out', str(bag)]) == 1
-    assert 'is not empty and holds no compare.json' in _message(capsys)
-    assert read_recording(bag).stream('pose')
+    assert 'is a recording; choose another folder' in _message(capsys)
+    assert sorted(bag.iterdir()) == before
 
 
 @pytest.mark.parametrize(('extra', 'message'), [

@@ -183,11 +183,12 @@ def test_bad_input_is_one_line(arguments: list[str], message: str, folder: Path,
     assert not (tmp_path / 'out').exists()
 
 
-def test_other_files_are_not_overwritten(folder: Path, tmp_path: Path, capsys: Any) -> None:
-    (tmp_path / 'mine.txt').write_text('keep')
-    assert run(['diagnose', str(folder.parent / HOSTILE), '--out', str(tmp_path)]) == 1
-    assert 'diagnosis.json' in capsys.readouterr().err
-    assert (tmp_path / 'mine.txt').read_text() == 'keep'
+def test_results_are_not_written_into_a_recording(folder: Path, capsys: Any) -> None:
+    bag = folder.parent / HOSTILE
+    before = sorted(bag.iterdir())
+    assert run(['diagnose', str(bag), '--out', str(bag)]) == 1
+    assert 'is a recording' in capsys.readouterr().err
+    assert sorted(bag.iterdir()) == before
 
 
 @pytest.mark.parametrize('module', ['matplotlib', 'jinja2'])
