@@ -18,6 +18,7 @@ from lg_husky_sim.diagnosis.fits import (
 )
 from lg_husky_sim.diagnosis.held_out import plant_of
 from lg_husky_sim.diagnosis.search import Progress, Search, search
+from lg_husky_sim.diagnosis.weighed import centred, weighed
 from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.effects import Onset, OnsetKind
@@ -78,11 +79,13 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
             before, tyred.structure, nominal.parameters,
             lambda text, share: progress(f'before the change: {text}', 0.4 * share),
             most=BEFORE, onsets=False, start=tyred, eager=True, workers=workers).final
+    loaded, known = known, weighed(known)
+    own = nominal.parameters if known is loaded else centred(nominal.parameters, known)
     first = next(piece for piece in whole.pieces if piece.recording not in baseline)
     onset = Onset(OnsetKind.TIME, first.start, first.recording)
     exact = known.parameters.with_entries(*(
         replace(p, tolerance=0.0) for p in known.parameters.entries))
-    moved = fit_structure(whole, known.structure, nominal.parameters,
+    moved = fit_structure(whole, known.structure, own,
                           first_metric(whole, whole.predict(plant_of(known), extras_of(known))),
                           known.solution.values, known.parameters, 0, polish=False) or known
     found = search(with_common_errors(whole, moved), known.structure, exact,

@@ -12,6 +12,7 @@ from lg_husky_sim.diagnosis.confidence import estimates
 from lg_husky_sim.diagnosis.doubts import is_guise
 from lg_husky_sim.diagnosis.encoders import as_read, is_momentary, read_otherwise
 from lg_husky_sim.diagnosis.events import event_words, what_happens
+from lg_husky_sim.diagnosis.everyday import little, more_than_everyday
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
@@ -154,12 +155,13 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
     if found.change is None or not names:
         unnamed = look_for_unnamed(whole, found.final, found.change)
     model = model_of(found.final, '; '.join(f.statement for f in names)
-                     or 'recalibrated, nothing added', with_intervals(found, nominal.parameters))
+                     or 'recalibrated, nothing named', with_intervals(found, nominal.parameters))
     final = found.final
     if judge.rolls_without_moving(whole):
         verdict, names = Verdict.UNKNOWN, (judge.no_ground_reaction(found),)
     elif unnamed is not None and (
-            is_guise(found, unnamed) if names else judge.is_unnamed(found, unnamed)):
+            is_guise(found, unnamed) if names else judge.is_unnamed(
+                found, more_than_everyday(unnamed))):
         verdict = Verdict.UNKNOWN
         finding, fit = _without_name(found, whole, unnamed)
         names = (finding,)
@@ -228,6 +230,9 @@ def _remaining(found: Search, unnamed: Unnamed | None) -> str:
 def _notes(found: Search, verdict: Verdict) -> tuple[str, ...]:
     bound = found.final.solution.at_bound
     notes = []
+    if little(found) and verdict is not Verdict.UNKNOWN:
+        notes.append('in the model, and too little to be called missing from it: '
+                     + little(found))
     if is_momentary(found.observations):
         notes.append('the wheel rates are read as those of the moment: this is nearer to the '
                      'data than means over the time in which an encoder counts')

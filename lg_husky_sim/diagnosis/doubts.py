@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 from lg_husky_sim.diagnosis.events import remain
+from lg_husky_sim.diagnosis.everyday import named
 from lg_husky_sim.diagnosis.evidence import FOLDS, folds_of
 from lg_husky_sim.diagnosis.fits import Fit, metric_beside
 from lg_husky_sim.diagnosis.misfit import is_far
@@ -77,7 +78,7 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
     Parameters
     ----------
     search : Search
-        That adopted something.
+        That named something.
     unnamed : Unnamed
         What smooth efforts explain on top of it.
 
@@ -85,14 +86,14 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
     -------
     bool
     """
-    named = [r for r in search.rounds if r.adopted]
-    gained = sum(r.rivals[0].held_out for r in named)
-    if gained < SLIGHT_GAIN and named[0].instability > SLIGHT_UNSTABLE:
+    rounds = named(search)
+    gained = sum(r.rivals[0].held_out for r in rounds)
+    if gained < SLIGHT_GAIN and rounds[0].instability > SLIGHT_UNSTABLE:
         return True
-    left = math.prod(1.0 - min(max(r.share, 0.0), 1.0) for r in named)
+    left = math.prod(1.0 - min(max(r.share, 0.0), 1.0) for r in rounds)
     if (1.0 - left < FAINT and is_far(search)) or remain(search):
         return True
-    effects = [r.rivals[0].effect for r in named]
+    effects = [r.rivals[0].effect for r in rounds]
     places = {effect.kind.subsystem for effect in effects}
     if places & AXLE:
         places |= AXLE

@@ -81,6 +81,9 @@ class EffectParameter:
     source : str
     fixed : bool
         A smoothing or shape constant that is not estimated.
+    everyday : float
+        How far from none of it a robot may be without anything missing from its model [unit]; 0
+        where every size counts.
     """
 
     name: str
@@ -90,6 +93,12 @@ class EffectParameter:
     starts: tuple[float, ...]
     source: str
     fixed: bool = False
+    everyday: float = 0.0
+
+    @property
+    def none(self) -> float:
+        """Value that is as if the effect were not there [unit]."""
+        return 1.0 if self.name.removesuffix(LATER).endswith('_factor') else 0.0
 
     def parameter(self, value: float | None = None) -> Parameter:
         """Return it as a parameter with ``value``, or with its first start."""
@@ -204,7 +213,7 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
     parameters = tuple(
         EffectParameter(key, str(p['unit']), float(p['lower']), float(p['upper']),
                         tuple(float(s) for s in p['starts']), str(p['source']),
-                        bool(p.get('fixed', False)))
+                        bool(p.get('fixed', False)), float(p.get('everyday', 0.0)))
         for key, p in entry['parameters'].items())
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),
