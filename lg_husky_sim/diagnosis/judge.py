@@ -19,7 +19,7 @@ from lg_husky_sim.diagnosis.events import (
     SHOWS,
     what_happens,
 )
-from lg_husky_sim.diagnosis.everyday import named, opened
+from lg_husky_sim.diagnosis.everyday import is_everyday, named, opened
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.misfit import against_before, beyond_chance, farthest, is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
@@ -200,14 +200,15 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     Returns
     -------
     bool
-        Whether an effect or a description explains more than chance, however little of it, or
-        the model is so far from the data, always or now and then, that something must be missing.
+        Whether an effect that is more than everyday, or a description, explains more than chance,
+        however little of it, or the model is so far from the data, always or now and then, that something must be missing.
     """
     if is_far(search) or what_happens(search):
         return True
     first = opened(search)[0]
     screened = first.scores[0].gain if first.scores else 0.0
-    tried = max((r.evidence for r in first.rivals), default=0.0)
+    tried = max((r.evidence for r in first.rivals
+                 if not is_everyday(r.effect, r.fit.parameters)), default=0.0)
     if search.change is not None:
         return screened > SCREENED_CHANGE + energy_in_moments(search) or (
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]) or (

@@ -13,7 +13,7 @@ from lg_husky_sim.diagnosis.diagnose import Case
 from lg_husky_sim.diagnosis.everyday import is_everyday, little, more_than_everyday, named, opened
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
 from lg_husky_sim.diagnosis.held_out import plant_of
-from lg_husky_sim.diagnosis.judge import findings
+from lg_husky_sim.diagnosis.judge import findings, is_unnamed
 from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
 from lg_husky_sim.diagnosis.weighed import centred, weighed
 from lg_husky_sim.husky.effects import catalogue, Effect
@@ -116,3 +116,16 @@ def test_a_smooth_effort_counts_where_it_is_more_than_everyday() -> None:
                                 (size,) * 9, (0.0, 1.0)) for size in (0.3, -0.6))
     both = Unnamed((small, large), 2.0, 10, Metric(np.ones(1), {}))
     assert more_than_everyday(both).descriptions == (large,)
+
+
+@pytest.mark.parametrize(('torque', 'expected'), [(0.2, False), (1.5, True)])
+def test_something_is_missing_only_if_it_is_more_than_everyday(
+        torque: float, expected: bool, diagnosed: Callable[[str], Case]) -> None:
+    clean, rubbing = diagnosed('nothing').search, diagnosed('drivetrain').search
+    best = named(rubbing)[0].rivals[0]
+    name = next(p.name for p in best.effect.parameters() if not p.fixed)
+    entry = replace(best.fit.parameters.entry(name), value=torque, low=None, high=None)
+    rival = replace(best, held_out=100.0, gain=100.0, beside_jitter=100.0, fit=replace(
+        best.fit, parameters=best.fit.parameters.with_entries(entry)))
+    search = replace(clean, rounds=(replace(clean.rounds[0], rivals=(rival,), adopted=False),))
+    assert is_unnamed(search, None) is expected
