@@ -201,7 +201,7 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     -------
     bool
         Whether an effect that is more than everyday, or a description, explains more than chance,
-        however little of it, or the model is so far from the data, always or now and then, that something must be missing.
+        however little of it, or the model is so far from the data that something must be missing.
     """
     if is_far(search) or what_happens(search):
         return True

@@ -105,13 +105,18 @@ def most_credible(gain: float) -> float:
 
 
 def rank(rival: Rival) -> float:
-    """Return held-out gain less what an onset, or what scales the whole ground, must bring."""
+    """
+    Return held-out gain less what an onset, or what scales the whole ground, must bring.
+
+    Added is what the recalibration need not move: a wheel that reads 4 % too little is as good as
+    the other one that reads 4 % too much with all wheels 4 % larger, which they are not.
+    """
     effect = rival.effect
     much = SWEEPING * abs(rival.held_out) if (
         effect.id == 'terrain_change' and effect.shape == 'damping') else 0.0
     if rival.onset is None:
-        return rival.held_out - much
-    return rival.held_out - much - LATER[0] - LATER[1] * abs(rival.held_out)
+        return rival.held_out + rival.relief - much
+    return rival.held_out + rival.relief - much - LATER[0] - LATER[1] * abs(rival.held_out)
 
 
 def adopts(best: Rival, share: float, unstable: float, rest: float, number: int,

@@ -185,7 +185,9 @@ def test_the_best_of_a_round_gains_what_it_explains(data: Observations, base: Fi
     raw = float(np.sum(held_out_cost(data, one.base, one.metric, folds)
                        - held_out_cost(data, best.fit, one.metric, folds)))
     assert best.held_out == min(raw, most_credible(best.gain + max(best.relief, 0.0)))
-    assert rank(best) == best.held_out
+    assert rank(best) == best.held_out + best.relief
+    strained = replace(best, held_out=best.held_out + 0.3, relief=best.relief - 3.0)
+    assert rank(strained) < rank(best)
 
 
 def test_what_is_serious_late_is_tried_as_always_there() -> None:
