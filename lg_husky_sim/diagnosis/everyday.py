@@ -50,6 +50,12 @@ def opened(search: Search) -> tuple[Round, ...]:
     return tuple(r for r in search.rounds if not (r.adopted and _is_little(search, r)))
 
 
+def most_tried(search: Search) -> float:
+    """Return the most that an effect beyond everyday sizes gained where none was named [nats]."""
+    return max((r.evidence for r in opened(search)[0].rivals
+                if not is_everyday(r.effect, r.fit.parameters)), default=0.0)
+
+
 def little(search: Search) -> str:
     """Return in words what everyday effects were adopted; empty without any."""
     found = []

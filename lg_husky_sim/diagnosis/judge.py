@@ -19,7 +19,7 @@ from lg_husky_sim.diagnosis.events import (
     SHOWS,
     what_happens,
 )
-from lg_husky_sim.diagnosis.everyday import is_everyday, named, opened
+from lg_husky_sim.diagnosis.everyday import most_tried, named, opened
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.misfit import against_before, beyond_chance, farthest, is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
@@ -207,8 +207,7 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
         return True
     first = opened(search)[0]
     screened = first.scores[0].gain if first.scores else 0.0
-    tried = max((r.evidence for r in first.rivals
-                 if not is_everyday(r.effect, r.fit.parameters)), default=0.0)
+    tried = most_tried(search)
     if search.change is not None:
         return screened > SCREENED_CHANGE + energy_in_moments(search) or (
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]) or (
@@ -371,7 +370,7 @@ def confidence(search: Search, verdict: Verdict, unnamed: Unnamed | None = None)
     first = opened(search)[0]
     strongest = max((r.held_out for r in first.rivals), default=0.0)
     if verdict is Verdict.NOTHING_MISSING:
-        strongest = max((r.evidence for r in first.rivals), default=0.0)
+        strongest = most_tried(search)
         half, width = SURE[search.change is not None]
         return float(1.0 / (1.0 + np.exp((strongest - half) / width)))
     if verdict is Verdict.UNKNOWN:
