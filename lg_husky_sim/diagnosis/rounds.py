@@ -37,6 +37,9 @@ from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
+#: Part of the best further effect's gain from which another may be adopted in its place, and the
+#: losses over gains of held-out blocks that it may have then.
+BESIDE, STEADY = 0.5, 0.1
 #: Sizes below which a dead time or a late stamp is no physics [s]: deviation of a command's time.
 SLIGHT = {'latency': JITTER, 'stamp_delay': JITTER}
 #: Candidates that are refitted in a round.
@@ -188,15 +191,26 @@ def play_round(observations: Observations, base: Fit, number: int, nominal: Para
                             beside))
     rivals.sort(key=lambda r: -rank(r))
     before = energy(observations, rebased, final)
-    after = energy(observations, rivals[0].fit, final)
     count = float(np.count_nonzero(final.scale))
-    share = (before - after) / max(before - 0.5 * count, 1e-9)
-    cost = held_out_cost(observations, rivals[0].fit, final, folds)
-    unstable = instability(observations, cost_base - cost)
-    rest = after / count
+
+    def explained(one: Rival) -> tuple[float, float, float]:
+        after = energy(observations, one.fit, final)
+        cost = held_out_cost(observations, one.fit, final, folds)
+        return ((before - after) / max(before - 0.5 * count, 1e-9),
+                instability(observations, cost_base - cost), after / count)
+    what = explained(rivals[0])
+    share, unstable, _ = what
     adopted = (rivals[0].held_out > LEAST_GAIN[0] and unstable < UNSTABLE[0] and share > 0.0
-               if eager else adopts(rivals[0], share, unstable, rest, number, only_late))
-    return Round(rebased, tuple(scores), tuple(rivals), final, share, adopted, unstable, rest)
+               if eager else adopts(rivals[0], *what, number, only_late))
+    for one in rivals[1:] if number > 0 and not (adopted or eager) else ():
+        # What gains most may explain next to nothing: a little friction, beside a second effect.
+        other = explained(one)
+        if rank(one) > BESIDE * rank(rivals[0]) and other[1] < STEADY and adopts(
+                one, *other, number, only_late):
+            what, adopted = other, True
+            rivals = [one, *(r for r in rivals if r is not one)]
+            break
+    return Round(rebased, tuple(scores), tuple(rivals), final, what[0], adopted, *what[1:])
 
 
 def is_slight(fit: Fit) -> bool:

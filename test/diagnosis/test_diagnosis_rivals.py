@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis import rounds
 from lg_husky_sim.diagnosis.candidates import Candidate, candidates, effect_entries
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost, strain
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate, shared_metric
@@ -213,3 +214,19 @@ def test_a_smooth_moment_must_be_confirmed(
     one = Description(Effect(effect, shape='yaw'), gained, 50.0, (0.0,) * 9, (0.0, 1.0),
                       confirmed=confirmed)
     assert is_unnamed(search, Unnamed((one,), 100.0, 1, used)) is unknown
+
+
+@pytest.mark.parametrize(('number', 'steady', 'first'), [
+    (1, 10.0, 'command_slew'), (1, 0.0, 'command_limit'), (0, 10.0, 'command_limit')])
+def test_a_steady_further_effect_passes_one_that_is_refused(
+        number: int, steady: float, first: str, data: Observations, base: Fit,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rounds, 'adopts', lambda best, *_: best.effect.id != LIMIT.id)
+    monkeypatch.setattr(rounds, 'STEADY', steady)
+    monkeypatch.setattr(rounds, 'BESIDE', -1e9)
+    one = rounds.play_round(data, base, number, load_model().parameters,
+                            [candidate(LIMIT), candidate(Effect('command_slew'))], (),
+                            folds_of(data))
+    assert one.rivals[0].effect.id == first
+    assert one.adopted is (first != LIMIT.id)
+    assert {r.effect.id for r in one.rivals} == {LIMIT.id, 'command_slew'}
