@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.alike import with_common_errors
+from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.diagnose import _notes
 from lg_husky_sim.diagnosis.doubts import belief, is_guise, reading_gain
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate, shared_metric
@@ -57,6 +58,9 @@ def plain(data: Observations) -> Fit:
 def searched(data: Observations, plain: Fit, final: Fit, change: bool = False,
              adopted: bool = False) -> Search:
     used = shared_metric(data, plain, [])
+    if adopted:
+        final = replace(final, parameters=final.parameters.with_entries(
+            *effect_entries(SCALE, {})))
     rivals = (Rival(SCALE, None, final, 900.0, 900.0),) if adopted else ()
     onset = Onset(OnsetKind.TIME, 0.0, 'after') if change else None
     return Search(data, plain, final, (Round(plain, (), rivals, used, 0.9, adopted),),

@@ -130,7 +130,9 @@ def named(record: Record, *effects: Effect) -> Search:
     used = shared_metric(data, fit, [])
     rounds = tuple(Round(fit, (), (Rival(effect, None, fit, 300.0, 300.0),), used, 0.5, True)
                    for effect in effects)
-    return Search(data, fit, fit, rounds, model.parameters)
+    final = replace(fit, parameters=fit.parameters.with_entries(
+        *(entry for effect in effects for entry in effect_entries(effect, {}))))
+    return Search(data, fit, final, rounds, model.parameters)
 
 
 @pytest.mark.parametrize(('part', 'efforts', 'guise'), [
