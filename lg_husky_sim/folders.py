@@ -43,7 +43,7 @@ def result_folder(path: Path, marker: str) -> Iterator[Path]:
     ----------
     path : pathlib.Path
         Where it shall be. Results of an earlier run are replaced at the end; other files stay,
-        and one that has the name of a result gets a ``~`` behind its own.
+        and one that has the name of a result gets a ``~`` or more behind its own.
     marker : str
         Name of the file that is there only if all others are, such as ``compare.json``; the
         caller writes it too.
@@ -68,7 +68,8 @@ def result_folder(path: Path, marker: str) -> Iterator[Path]:
         yield made
         check_folder(target)
         names = sorted((one.name for one in made.iterdir()), key=lambda name: name == marker)
-        (made / _list_of(marker)).write_text(''.join(f'{name}\n' for name in names))
+        (made / _list_of(marker)).write_text(
+            ''.join(f'{name}\n' for name in names), encoding='utf-8', errors='surrogateescape')
         if target.exists():
             _install(made, target, [_list_of(marker), *names])
         else:
@@ -84,16 +85,26 @@ def _install(made: Path, target: Path, names: list[str]) -> None:
     # The list comes first and the marker last: without it, nobody takes the rest for results.
     listed = target / names[0]
     there = {one.name for one in target.iterdir()}
-    mine = there & {names[0], *(listed.read_text().splitlines() if listed.is_file() else ())}
+    mine = there & {names[0]}
+    if listed.is_file():
+        mine |= there & {*listed.read_text('utf-8', 'surrogateescape').splitlines()}
     for name in mine - set(names[:-1]):
         _remove(target / name)
     for name in names:
         old, new = target / name, made / name
         if name in there - mine:
-            replace(old, old.with_name(f'{name}~'))
+            replace(old, _free(target, name))
         elif name in mine and (old.is_dir() or new.is_dir()):
             _remove(old)
         replace(new, old)
+
+
+def _free(folder: Path, name: str) -> Path:
+    # The name with as many tildes behind it as it takes to be nobody's.
+    kept = folder / f'{name}~'
+    while kept.exists() or kept.is_symlink():
+        kept = kept.with_name(f'{kept.name}~')
+    return kept
 
 
 def _remove(path: Path) -> None:

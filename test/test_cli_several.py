@@ -53,9 +53,10 @@ def test_a_flag_without_its_word_is_said() -> None:
 
 
 @pytest.mark.parametrize(('verb', 'several'), [
-    ('diagnose', {'baselines', 'settings'}), ('compare', {'settings'}),
-    ('evaluate', {'held_out', 'steps', 'rivals', 'settings'}), ('identify', {'settings'}),
-    ('simulate', {'settings'}),
+    ('diagnose', {'baselines', 'settings', 'topics'}), ('compare', {'settings', 'topics'}),
+    ('evaluate', {'held_out', 'steps', 'rivals', 'settings', 'topics'}),
+    ('identify', {'settings', 'topics'}), ('simulate', {'settings', 'topics'}),
+    ('play', {'topics'}),
 ])
 def test_the_verbs_say_which_options_take_several(verb: str, several: set[str]) -> None:
     command = cli.get_command(click.Context(cli), verb)

@@ -54,15 +54,17 @@ def test_what_is_not_ours_stays(tmp_path: Path) -> None:
     (out / 'thesis.tex').write_text('mine')
     (out / 'chapter' / 'one.tex').write_text('mine')
     (out / 'a').write_text('mine too')
+    (out / 'a~').write_text('an older one of mine')
     for content in ('first', 'second'):
         _fill(out, 'a', content)
         assert (out / 'thesis.tex').read_text() == 'mine'
         assert (out / 'chapter' / 'one.tex').read_text() == 'mine'
         assert (out / 'a').read_text() == content
-        assert (out / 'a~').read_text() == 'mine too'
+        assert (out / 'a~').read_text() == 'an older one of mine'
+        assert (out / 'a~~').read_text() == 'mine too'
     _fill(out, 'b')
     assert {path.name for path in out.iterdir() if not path.name.startswith('.')} == {
-        'thesis.tex', 'chapter', 'a~', 'b', 'result.json'}
+        'thesis.tex', 'chapter', 'a~', 'a~~', 'b', 'result.json'}
 
 
 def test_an_open_log_in_the_folder_goes_on(tmp_path: Path) -> None:

@@ -23,8 +23,8 @@ from lg_husky_sim.cli.several import SeveralWords
               help='A recording of the same drive by another simulator, one for each REC in '
                    'their order, to stand beside the models.')
 @click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
-              help='Override a physical parameter of every model; may be given several times.')
-@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
+              help='Override physical parameters of every model.')
+@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
               help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).')
 @click.option('--horizon', type=float, default=0.0, metavar='SECONDS',
               help='Start anew from the measured state after so many seconds; by default only '

@@ -24,7 +24,7 @@ from lg_husky_sim.cli.several import SeveralWords
               help="Model in doubt; the Husky with the paper's parameters by default.")
 @click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
               help='Override physical parameters.')
-@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
+@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
               help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).')
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
               help='Kept for reproducible scripts: the search itself draws nothing by chance.')

@@ -38,7 +38,7 @@ from lg_husky_sim.cli.several import SeveralWords
               help='Starts of the least squares.')
 @click.option('--jobs', type=click.IntRange(min=1), default=1, show_default=True,
               help='Processes to use.')
-@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
+@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
               help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).')
 def command(
     out: Path, cases: tuple[str, ...], calibrate: tuple[str, ...], held_out: tuple[str, ...],

@@ -47,7 +47,7 @@ from lg_husky_sim.cli.several import SeveralWords
               help='Dask scheduler to use in place of processes, such as tcp://10.0.0.1:8786.')
 @click.option('--each', is_flag=True,
               help='Fit every recording on its own in place of all together.')
-@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
+@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
               help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).')
 def command(
     recordings: tuple[str, ...], out: Path, model: Path | None, settings: tuple[str, ...],

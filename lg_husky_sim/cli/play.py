@@ -15,7 +15,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.argument('recording', type=click.Path(path_type=Path), metavar='REC')
 @click.option('--preset', default='paper', show_default=True,
               help='Names and types to send under: paper, husky_ros1 or clearpath_jazzy.')
-@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
+@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
               help='Choose a topic of the recording by hand (command=/cmd_vel, …).')
 @click.option('--speed', default=1.0, show_default=True, type=click.FloatRange(0.01, 100.0),
               help='How many times as fast as it was recorded.')

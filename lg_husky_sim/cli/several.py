@@ -21,9 +21,9 @@ class SeveralWords(click.Command):
     """
     A command of which some repeatable options also take several words after one flag.
 
-    Those with a ``=`` in their metavar go on as long as words look like settings; those with a
-    ``…`` up to the next option, unless nothing would be left for the command's own arguments:
-    then one word belongs to each flag.
+    It is those with a ``…`` in their metavar. If there is a ``=`` in it, too, they go on as long
+    as words look like settings; the others up to the next option, unless nothing would be left
+    for the command's own arguments: then one word belongs to each flag.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -65,8 +65,8 @@ def _first(rest: Iterator[str]) -> list[str]:
 def _owner(before: list[str], options: dict[str, click.Option], word: str, greedy: bool
            ) -> str | None:
     # The flag of a repeatable option whose value stands just before this word.
-    if len(before) < 2 or (option := options.get(before[-2])) is None or not option.multiple:
+    option = options.get(before[-2]) if len(before) > 1 else None
+    shown = '' if option is None else option.metavar or ''
+    if '…' not in shown:
         return None
-    shown = option.metavar or ''
-    mine = SETTING.match(word) if '=' in shown else greedy and '…' in shown
-    return before[-2] if mine else None
+    return before[-2] if (SETTING.match(word) if '=' in shown else greedy) else None

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
               help="Samples per second; by default a recording's own stamps, else 50.")
 @click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
               help='Override physical parameters.')
-@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME',
+@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
               help='Choose a topic or frame of the recording by hand (command=/cmd_vel, …).')
 @click.option('--overwrite', is_flag=True, help='Replace a rosbag2 that is at BAG.')
 def command(

@@ -12,7 +12,7 @@ from lg_husky_sim.diagnosis.confidence import estimates
 from lg_husky_sim.diagnosis.doubts import is_guise
 from lg_husky_sim.diagnosis.encoders import as_read, is_momentary, read_otherwise
 from lg_husky_sim.diagnosis.events import event_words, what_happens
-from lg_husky_sim.diagnosis.everyday import little, more_than_everyday
+from lg_husky_sim.diagnosis.everyday import everyday_words, more_than_everyday
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
@@ -230,9 +230,9 @@ def _remaining(found: Search, unnamed: Unnamed | None) -> str:
 def _notes(found: Search, verdict: Verdict) -> tuple[str, ...]:
     bound = found.final.solution.at_bound
     notes = []
-    if little(found) and verdict is not Verdict.UNKNOWN:
+    if everyday_words(found) and verdict is not Verdict.UNKNOWN:
         notes.append('in the model, and too little to be called missing from it: '
-                     + little(found))
+                     + everyday_words(found))
     if is_momentary(found.observations):
         notes.append('the wheel rates are read as those of the moment: this is nearer to the '
                      'data than means over the time in which an encoder counts')

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from lg_husky_sim.diagnosis.events import remain
-from lg_husky_sim.diagnosis.everyday import named
+from lg_husky_sim.diagnosis.everyday import named_rounds
 from lg_husky_sim.diagnosis.evidence import FOLDS, folds_of
 from lg_husky_sim.diagnosis.fits import Fit, metric_beside
 from lg_husky_sim.diagnosis.misfit import is_far
@@ -86,7 +86,7 @@ def is_guise(search: Search, unnamed: Unnamed) -> bool:
     -------
     bool
     """
-    rounds = named(search)
+    rounds = named_rounds(search)
     gained = sum(r.rivals[0].held_out for r in rounds)
     if gained < SLIGHT_GAIN and rounds[0].instability > SLIGHT_UNSTABLE:
         return True

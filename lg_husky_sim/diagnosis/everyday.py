@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis.candidates import neutral
 from lg_husky_sim.diagnosis.rounds import Round
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.unnamed import Unnamed
@@ -36,27 +37,28 @@ def is_everyday(effect: Effect, numbers: Mapping[str, float]) -> bool:
     bool
     """
     return all(
-        abs(numbers[p.name] - (numbers[p.name.removesuffix(LATER)] if effect.again else p.none))
+        abs(numbers[p.name] - (numbers[p.name.removesuffix(LATER)] if effect.again
+                             else neutral(p.name)))
         <= p.everyday for p in effect.parameters() if not p.fixed)
 
 
-def named(search: Search) -> tuple[Round, ...]:
+def named_rounds(search: Search) -> tuple[Round, ...]:
     """Return the rounds whose effect was adopted and is more than everyday."""
     return tuple(r for r in search.rounds if r.adopted and not _is_little(search, r))
 
 
-def opened(search: Search) -> tuple[Round, ...]:
+def open_rounds(search: Search) -> tuple[Round, ...]:
     """Return all rounds but those that adopted something everyday."""
     return tuple(r for r in search.rounds if not (r.adopted and _is_little(search, r)))
 
 
 def most_tried(search: Search) -> float:
     """Return the most that an effect beyond everyday sizes gained where none was named [nats]."""
-    return max((r.evidence for r in opened(search)[0].rivals
+    return max((r.evidence for r in open_rounds(search)[0].rivals
                 if not is_everyday(r.effect, r.fit.parameters)), default=0.0)
 
 
-def little(search: Search) -> str:
+def everyday_words(search: Search) -> str:
     """Return in words what everyday effects were adopted; empty without any."""
     found = []
     for effect in (r.rivals[0].effect for r in search.rounds

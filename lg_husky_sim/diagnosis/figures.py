@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from lg_husky_sim.comparison.figures import COLOURS, MEASURED, STYLE
 from lg_husky_sim.diagnosis.diagnose import Case
+from lg_husky_sim.diagnosis.everyday import named_rounds
 from lg_husky_sim.diagnosis.fits import extras_of
 from lg_husky_sim.diagnosis.locate import Located
 from lg_husky_sim.diagnosis.result import Estimate, Verdict
@@ -175,11 +176,17 @@ def rivals_figure(case: Case) -> Figure | None:
             axes.set_axis_off()
         for axes, (number, one) in zip(grid, enumerate(rounds), strict=False):
             _draw_round(axes, one)
-            named = 'adopted' if case.diagnosis.verdict is Verdict.KNOWN else (
-                'nearest, but not its name')
-            axes.set_title(f'Round {number + 1}: '
-                           + (named if one.adopted else 'nothing adopted'))
+            axes.set_title(f'Round {number + 1}: {_outcome(case, one)}')
     return figure
+
+
+def _outcome(case: Case, one: Round) -> str:
+    # What became of a round's best candidate.
+    if not one.adopted:
+        return 'nothing adopted'
+    if case.diagnosis.verdict is Verdict.UNKNOWN:
+        return 'nearest, but not its name'
+    return 'adopted' if one in named_rounds(case.search) else 'too little to be missing'
 
 
 def _draw_round(axes: Axes, one: Round) -> None:

@@ -19,7 +19,7 @@ from lg_husky_sim.diagnosis.events import (
     SHOWS,
     what_happens,
 )
-from lg_husky_sim.diagnosis.everyday import most_tried, named, opened
+from lg_husky_sim.diagnosis.everyday import most_tried, named_rounds, open_rounds
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
 from lg_husky_sim.diagnosis.misfit import against_before, beyond_chance, farthest, is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
@@ -139,7 +139,7 @@ def findings(search: Search) -> tuple[Finding, ...]:
     observations, found = search.observations, []
     hypotheses = len(candidates())
     folds = folds_of(observations)
-    for one in named(search):
+    for one in named_rounds(search):
         best = one.rivals[0]
         effect = best.effect
         names = [p.name for p in effect.parameters() if not p.fixed]
@@ -176,7 +176,7 @@ def indistinguishable(search: Search) -> tuple[Indistinguishable, ...]:
         A set for each named effect with rivals that explain held-out data about as well.
     """
     found = []
-    for one in named(search):
+    for one in named_rounds(search):
         best = one.rivals[0]
         near = [r for r in one.rivals[1:] if r.effect.id != best.effect.id and is_near(r, best)]
         if near:
@@ -205,7 +205,7 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     """
     if is_far(search) or what_happens(search):
         return True
-    first = opened(search)[0]
+    first = open_rounds(search)[0]
     screened = first.scores[0].gain if first.scores else 0.0
     tried = most_tried(search)
     if search.change is not None:
@@ -308,7 +308,7 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
     Description or None
         The description to put into the model, where it predicts held-out data better.
     """
-    first, seen = opened(search)[0], what_happens(search)
+    first, seen = open_rounds(search)[0], what_happens(search)
     rivals = _rivals(first, None)
     near = max(first.rivals, key=lambda r: r.held_out, default=None)
     best = unnamed.descriptions[0] if unnamed.descriptions else None
@@ -367,7 +367,7 @@ def confidence(search: Search, verdict: Verdict, unnamed: Unnamed | None = None)
     float
         Between 0 and 1.
     """
-    first = opened(search)[0]
+    first = open_rounds(search)[0]
     strongest = max((r.held_out for r in first.rivals), default=0.0)
     if verdict is Verdict.NOTHING_MISSING:
         strongest = most_tried(search)

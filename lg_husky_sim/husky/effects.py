@@ -95,11 +95,6 @@ class EffectParameter:
     fixed: bool = False
     everyday: float = 0.0
 
-    @property
-    def none(self) -> float:
-        """Value that is as if the effect were not there [unit]."""
-        return 1.0 if self.name.removesuffix(LATER).endswith('_factor') else 0.0
-
     def parameter(self, value: float | None = None) -> Parameter:
         """Return it as a parameter with ``value``, or with its first start."""
         return Parameter(self.name, self.starts[0] if value is None else value, self.unit,

@@ -7,13 +7,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.candidates import effect_entries, neutral
 from lg_husky_sim.diagnosis.closed_base import TYRES
 from lg_husky_sim.diagnosis.diagnose import Case
-from lg_husky_sim.diagnosis.everyday import is_everyday, little, more_than_everyday, named, opened
+from lg_husky_sim.diagnosis.everyday import (
+    everyday_words,
+    is_everyday,
+    more_than_everyday,
+    named_rounds,
+    open_rounds,
+)
+from lg_husky_sim.diagnosis.figures import rivals_figure
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
 from lg_husky_sim.diagnosis.held_out import plant_of
 from lg_husky_sim.diagnosis.judge import findings, is_unnamed
+from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
 from lg_husky_sim.diagnosis.weighed import centred, weighed
 from lg_husky_sim.husky.effects import catalogue, Effect
@@ -29,7 +37,7 @@ import pytest
 
 def _loaded(record: Callable[..., Recording], shape: str, tyres: bool
             ) -> tuple[Fit, FloatArray, Observations]:
-    # A fit of a robot that carries 20 kg, and its prediction of a drive.
+    # A fit of a robot that carries 20 kg, its prediction of a drive, and the drive.
     model = load_model()
     drive = record('rec', compile_model(model.structure).at(model.parameters), [
         (1.0, 0.0, 0.0), (2.0, 0.8, 0.0), (2.0, 0.4, 0.9), (2.0, 0.0, -0.8)], 3)
@@ -87,8 +95,8 @@ def test_what_every_robot_has_a_little_of(effect: Effect, numbers: dict[str, flo
     assert is_everyday(effect, numbers) is expected
 
 
-def test_everyday_sizes_are_well_below_what_estimations_begin_with() -> None:
-    sizes = [(p.everyday, max(abs(start - p.none) for start in p.starts))
+def test_everyday_sizes_are_below_the_largest_that_estimations_begin_with() -> None:
+    sizes = [(p.everyday, max(abs(start - neutral(p.name)) for start in p.starts))
              for kind in catalogue().values() for p in kind.parameters if p.everyday > 0.0]
     assert len(sizes) > 20
     assert all(everyday < start for everyday, start in sizes)
@@ -96,19 +104,25 @@ def test_everyday_sizes_are_well_below_what_estimations_begin_with() -> None:
 
 def test_an_everyday_effect_is_modelled_and_said_but_not_named(
         diagnosed: Callable[[str], Case]) -> None:
-    search = diagnosed('drivetrain').search
-    assert named(search) == tuple(r for r in search.rounds if r.adopted)
-    assert opened(search) == search.rounds
-    assert not little(search)
-    name = next(p.name for p in named(search)[0].rivals[0].effect.parameters() if not p.fixed)
+    case = diagnosed('drivetrain')
+    search = case.search
+    assert named_rounds(search) == tuple(r for r in search.rounds if r.adopted)
+    assert open_rounds(search) == search.rounds
+    assert not everyday_words(search)
+    effect = named_rounds(search)[0].rivals[0].effect
+    name = next(p.name for p in effect.parameters() if not p.fixed)
     entry = search.final.parameters.entry(name)
     final = replace(search.final, parameters=search.final.parameters.with_entries(
         replace(entry, value=0.1, low=None, high=None)))
     slight = replace(search, final=final)
     assert not findings(slight)
-    assert opened(slight) == tuple(r for r in search.rounds if not r.adopted)
-    assert name.replace('_', ' ') in little(slight)
-    assert '0.1' in little(slight)
+    assert open_rounds(slight) == tuple(r for r in search.rounds if not r.adopted)
+    assert name.replace('_', ' ') in everyday_words(slight)
+    assert '0.1' in everyday_words(slight)
+    figure = rivals_figure(replace(case, search=slight, diagnosis=replace(
+        case.diagnosis, verdict=Verdict.NOTHING_MISSING)))
+    assert figure is not None
+    assert figure.axes[0].get_title(loc='left') == 'Round 1: too little to be missing'
 
 
 def test_a_smooth_effort_counts_where_it_is_more_than_everyday() -> None:
@@ -122,7 +136,7 @@ def test_a_smooth_effort_counts_where_it_is_more_than_everyday() -> None:
 def test_something_is_missing_only_if_it_is_more_than_everyday(
         torque: float, expected: bool, diagnosed: Callable[[str], Case]) -> None:
     clean, rubbing = diagnosed('nothing').search, diagnosed('drivetrain').search
-    best = named(rubbing)[0].rivals[0]
+    best = named_rounds(rubbing)[0].rivals[0]
     name = next(p.name for p in best.effect.parameters() if not p.fixed)
     entry = replace(best.fit.parameters.entry(name), value=torque, low=None, high=None)
     rival = replace(best, held_out=100.0, gain=100.0, beside_jitter=100.0, fit=replace(
