@@ -16,6 +16,7 @@ import math
 
 from lg_husky_sim.diagnosis.fits import EVENT, Fit
 from lg_husky_sim.diagnosis.lost_commands import without_lost_commands
+from lg_husky_sim.diagnosis.rounds import Round
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.identification.noise import Metric, scales, spread
@@ -173,13 +174,14 @@ def are_others(one: Moments, usual: Moments) -> bool:
     return often > OTHERS or one.largest > OTHERS * usual.largest
 
 
-def energy_in_moments(search: Search) -> float:
+def energy_in_moments(search: Search, first: Round) -> float:
     """
-    Return what the moments of the recordings in question hold before anything is adopted.
+    Return what the moments of the recordings in question hold before a round adopts anything.
 
     Parameters
     ----------
     search : Search
+    first : Round
 
     Returns
     -------
@@ -187,7 +189,7 @@ def energy_in_moments(search: Search) -> float:
         Half the sum of squares of what the model leaves in them, with their full weight [nats]:
         what screening likes for so much it may like for a lost command alone.
     """
-    observations, first = search.observations, search.rounds[0]
+    observations = search.observations
     predicted = first.base.solution.predicted
     residual = observations.measured - predicted
     begins = {begin for one in moments(observations, first.base, None, search.sides[1]).values()

@@ -18,7 +18,7 @@ from lg_husky_sim.diagnosis.candidates import neutral
 from lg_husky_sim.diagnosis.rounds import Round
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.unnamed import Unnamed
-from lg_husky_sim.husky.effects import Effect, LATER
+from lg_husky_sim.husky.effects import Effect, EffectParameter, LATER
 
 
 def is_everyday(effect: Effect, numbers: Mapping[str, float]) -> bool:
@@ -36,10 +36,11 @@ def is_everyday(effect: Effect, numbers: Mapping[str, float]) -> bool:
     -------
     bool
     """
-    return all(
-        abs(numbers[p.name] - (numbers[p.name.removesuffix(LATER)] if effect.again
-                             else neutral(p.name)))
-        <= p.everyday for p in effect.parameters() if not p.fixed)
+    def usual(p: EffectParameter) -> float:
+        return numbers[p.name.removesuffix(LATER)] if effect.again else neutral(p.name)
+
+    return all(abs(numbers[p.name] - usual(p)) <= p.everyday
+               for p in effect.parameters() if not p.fixed)
 
 
 def named_rounds(search: Search) -> tuple[Round, ...]:

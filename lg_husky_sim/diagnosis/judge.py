@@ -209,7 +209,7 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
     screened = first.scores[0].gain if first.scores else 0.0
     tried = most_tried(search)
     if search.change is not None:
-        return screened > SCREENED_CHANGE + energy_in_moments(search) or (
+        return screened > SCREENED_CHANGE + energy_in_moments(search, first) or (
             tried > CERTAIN_CHANGE and first.share > CHANGE_SHARE[1]) or (
             unnamed is not None and unnamed.held_out > SMOOTH_CHANGE
             and unnamed.share > CHANGE_SHARE[1]

@@ -150,8 +150,7 @@ def test_a_lost_command_alone_is_no_change(stalled: Callable[..., Recording], ga
                        Onset(OnsetKind.TIME, 0.0, 'rec'))
     metric = first_metric(search.observations, search.plain.solution.predicted)
     one = candidates()[0]
-    held = energy_in_moments(replace(search, rounds=(
-        Round(search.plain, (), (), metric, 0.0, False),)))
+    held = energy_in_moments(search, Round(search.plain, (), (), metric, 0.0, False))
     assert held > 1000.0
     liked = Score(Signature(one, one.starts[0], np.zeros((0, 1)), one.signed), 500.0 + gain * held,
                   (1.0,))
