@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 import itertools
 import math
@@ -124,6 +124,27 @@ def changed_candidates(structure: Structure, parameters: Parameters) -> tuple[Ca
                 starts.append(whole)
         found.append(Candidate(again, tuple(starts), False))
     return tuple(found)
+
+
+def still_open(pool: Iterable[Candidate], structure: Structure) -> list[Candidate]:
+    """
+    Return the candidates that a structure can still take.
+
+    Parameters
+    ----------
+    pool : iterable of Candidate
+    structure : Structure
+
+    Returns
+    -------
+    list of Candidate
+        Without those whose effect it has on that side, and without those that share a number with
+        an effect it has: dry friction of the left side and of the right one cannot differ.
+    """
+    taken = {(e.id, e.side, e.again) for e in structure.effects}
+    numbers = {p.name for e in structure.effects for p in e.parameters()}
+    return [c for c in pool if (c.effect.id, c.effect.side, c.effect.again) not in taken
+            and numbers.isdisjoint(p.name for p in c.effect.parameters())]
 
 
 def effect_unknowns(effect: Effect, start: Mapping[str, float]) -> tuple[Unknown, ...]:

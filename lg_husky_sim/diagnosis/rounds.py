@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from lg_husky_sim.diagnosis.candidates import Candidate
+from lg_husky_sim.diagnosis.candidates import Candidate, still_open
 from lg_husky_sim.diagnosis.evidence import energy, held_out_cost, instability, strain
 from lg_husky_sim.diagnosis.fits import at_nominal, Fit, fit_structure, shared_metric
 from lg_husky_sim.diagnosis.jitter import gains_beside_jitter, JITTER
@@ -120,8 +120,7 @@ def play_round(observations: Observations, base: Fit, number: int, nominal: Para
     -------
     Round
     """
-    taken = {(e.id, e.side, e.again) for e in base.structure.effects}
-    asked = [c for c in pool if (c.effect.id, c.effect.side, c.effect.again) not in taken]
+    asked = still_open(pool, base.structure)
     signatures = [s for found in workers.map(
         look, [Looked(c, base, observations) for c in asked]) for s in found]
     common = shared_metric(observations, base, signatures)

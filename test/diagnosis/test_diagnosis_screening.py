@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from lg_husky_sim.diagnosis.candidates import candidates, effect_entries
+from lg_husky_sim.diagnosis.candidates import candidates, effect_entries, still_open
 from lg_husky_sim.diagnosis.fits import recalibrate, shared_metric
 from lg_husky_sim.diagnosis.refits import look, Looked
 from lg_husky_sim.diagnosis.rounds import screen
@@ -32,3 +32,12 @@ def test_a_limit_is_screened_first_however_low_it_is(
     signatures = [s for c in candidates() for s in look(Looked(c, base, data))]
     used = shared_metric(data, base, signatures)
     assert screen(data, base, used, signatures, ())[0].signature.candidate.effect.id == effect
+
+
+def test_no_candidate_shares_a_number_with_what_is_in() -> None:
+    """Friction of the right side beside that of the left one would be the same number twice."""
+    structure = load_model().structure.with_effect(
+        Effect('coulomb_drivetrain', 'left')).with_effect(Effect('gyro_scale'))
+    left = still_open(candidates(), structure)
+    assert {c.effect.id for c in candidates()} - {c.effect.id for c in left} == {
+        'coulomb_drivetrain', 'gyro_scale', 'gyro_sign'}
