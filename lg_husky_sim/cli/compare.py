@@ -43,13 +43,13 @@ def command(
     channel and the largest tracking errors, as a table, as JSON and on one page. Give the
     recordings in the order in which they were driven.
     """
-    from lg_husky_sim.comparison.models import load_plants, plants_in
+    from lg_husky_sim.comparison.models import load_plants, plants_in, recordings_of
     from lg_husky_sim.comparison.outcome import compare_recording, text_table
     from lg_husky_sim.comparison.page import check_extras, MARKER, pictured, write_files
     from lg_husky_sim.errors import CommandError
     from lg_husky_sim.folders import check_folder, result_folder
     from lg_husky_sim.husky.model_file import parse_settings
-    from lg_husky_sim.recording import named_apart, read_recording, TopicMap
+    from lg_husky_sim.recording import named_apart, named_as_in, read_recording, TopicMap
     from tqdm import tqdm
 
     check_extras()
@@ -62,8 +62,9 @@ def command(
     overridden = parse_settings(settings)
     plants = load_plants(models, overridden)
     choice = TopicMap.parse(topics)
-    read, = named_apart([read_recording(path, choice) for path in tqdm(
-        recordings, desc='reading', unit='recording', disable=None, leave=False)])
+    read, = named_apart(named_as_in([read_recording(path, choice) for path in tqdm(
+        recordings, desc='reading', unit='recording', disable=None, leave=False)],
+        recordings_of(plants)))
     names = [recording.name for recording in read]
     outcomes = []
     for place, recording in enumerate(tqdm(read, desc='replaying', unit='recording',

@@ -44,7 +44,7 @@ def command(
     /husky_velocity_controller/cmd_vel. A recording with gaps is driven segment by segment, each
     from the state that the robot was in.
     """
-    from lg_husky_sim.comparison.models import load_plants
+    from lg_husky_sim.comparison.models import load_plants, recordings_of
     from lg_husky_sim.husky.model_file import parse_settings
     from lg_husky_sim.manoeuvres import checked_rate
     from lg_husky_sim.recording import TopicMap, write_recording
@@ -60,8 +60,8 @@ def command(
     start_ns, frames = START_NS, ('odom', 'base_link')
     if _is_recording(commands):
         from lg_husky_sim.comparison.output import simulate_recording
-        from lg_husky_sim.recording import read_recording
-        recording = read_recording(commands, choice)
+        from lg_husky_sim.recording import named_as_in, read_recording
+        recording, = named_as_in([read_recording(commands, choice)], recordings_of([named]))
         start_ns = recording.start_ns
         frames = recording.frames if recording.frames[0] else frames
         streams = simulate_recording(named.plant, recording, torque, rate or 0.0)

@@ -98,6 +98,12 @@ def plants_in(
     return tuple(found)
 
 
+def recordings_of(plants: Sequence[NamedPlant]) -> tuple[str, ...]:
+    """Return the names of recordings between which effects of some plants begin."""
+    return tuple(name for named in plants if named.plant.onset is not None
+                 for name in named.plant.onset.recordings)
+
+
 def unique_labels(paths: Sequence[Path]) -> tuple[str, ...]:
     """
     Return a short name for each path, all different.

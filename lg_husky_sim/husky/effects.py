@@ -64,6 +64,11 @@ class Onset:
     recording: str = ''
     earlier: tuple[str, ...] = ()
 
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """Names of the recordings that it tells apart."""
+        return (*self.earlier, self.recording) if self.recording else self.earlier
+
 
 @dataclass(frozen=True)
 class EffectParameter:

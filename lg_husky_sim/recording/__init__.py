@@ -6,7 +6,7 @@ Recordings: ROS bags read into time series, and written from them.
 Reads rosbag2 (MCAP, sqlite3) and ROS 1 bags without ROS, by way of the library `rosbags`.
 """
 
-from lg_husky_sim.recording.names import named_apart
+from lg_husky_sim.recording.names import named_apart, named_as_in
 from lg_husky_sim.recording.reader import read_recording
 from lg_husky_sim.recording.recording import Recording, Segment, segments, windows
 from lg_husky_sim.recording.topics import TopicMap
@@ -17,6 +17,7 @@ __all__ = [
     'Segment',
     'TopicMap',
     'named_apart',
+    'named_as_in',
     'read_recording',
     'segments',
     'windows',

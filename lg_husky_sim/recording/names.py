@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 import os
 from pathlib import PurePath
@@ -34,10 +34,10 @@ def named_apart(*groups: Sequence[Recording]) -> tuple[tuple[Recording, ...], ..
     RecordingError
         If a recording is given twice.
     """
-    places = [_ladder(recording)[-1] for group in groups for recording in group]
+    places = [os.path.realpath(recording.path) for group in groups for recording in group]
     for place in places:
         if places.count(place) > 1:
-            raise RecordingError(f'recording /{place} is given twice')
+            raise RecordingError(f'recording {place} is given twice')
     taken: set[str] = set()
     found = []
     for group in groups:
@@ -49,18 +49,46 @@ def named_apart(*groups: Sequence[Recording]) -> tuple[tuple[Recording, ...], ..
     return tuple(found)
 
 
+def named_as_in(recordings: Sequence[Recording], known: Collection[str]
+                ) -> tuple[Recording, ...]:
+    """
+    Return recordings under the names that a model's onset knows them by.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    known : collection of str
+        Names of recordings in a model file, some with the folders that told them apart.
+
+    Returns
+    -------
+    tuple of Recording
+        Each with the longest known name that its place ends in; with its own if there is none.
+    """
+    found = []
+    for recording in recordings:
+        name = next((one for one in reversed(_ladder(recording)) if one in known),
+                    recording.name)
+        found.append(recording if name == recording.name else replace(recording, name=name))
+    return tuple(found)
+
+
 def _apart(group: Sequence[Recording], taken: set[str]) -> list[str]:
     # Each with as few folders as tell it from the others and from what is taken.
     ladders = [_ladder(recording) for recording in group]
     names = []
     for number, ladder in enumerate(ladders):
         others = set(taken).union(*(one for k, one in enumerate(ladders) if k != number))
-        names.append(next(one for one in ladder if one not in others))
+        names.append(next((one for one in ladder if one not in others), ladder[-1]))
     return names
 
 
 def _ladder(recording: Recording) -> list[str]:
-    # The name alone, then with more and more of the folders in which the recording lies.
-    folders = PurePath(os.path.abspath(recording.path)).parent.parts[1:]
-    return [recording.name, *('/'.join((*folders[-count:], recording.name))
-                              for count in range(1, len(folders) + 1))]
+    # The name alone, then with more and more of the folders in which the recording lies; the
+    # last is where it really lies, which no two share.
+    place = PurePath(os.path.realpath(recording.path))
+    folders = place.parent.parts[1:]
+    return [recording.name,
+            *('/'.join((*folders[-count:], recording.name))
+              for count in range(1, len(folders) + 1)),
+            f'{place.parent}/{recording.name}', str(place)]

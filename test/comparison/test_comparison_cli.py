@@ -4,12 +4,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import json
 from pathlib import Path
 import re
 from typing import Any
 
 from lg_husky_sim.cli.main import run
+from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
 from lg_husky_sim.recording import read_recording, segments, write_recording
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
@@ -231,3 +235,24 @@ def test_compare_with_one_measured_stream(kept: tuple[str, ...], bag: Path) -> N
         assert list(results[label]['rmse']) == expected
     assert max(results['one']['rmse'].values()) < 0.02  # the rival is the recording itself
     assert (results['paper']['bounds_m']['x'] is None) == (kept != ('pose',))
+
+
+def test_a_model_knows_its_recordings_by_their_folders(bag: Path, tmp_path: Path) -> None:
+    """An effect that begins between two bags of one name is found in the later one only."""
+    effect = Effect('gyro_bias')
+    plain = load_model()
+    model = ModelFile(
+        plain.structure.with_effect(
+            replace(effect, late=True),
+            Onset(OnsetKind.TIME, 1.0, 'tue/drive', ('drive',))),
+        plain.parameters.with_entries(*effect_entries(effect, {'gyro_bias': 0.2})), 'bias')
+    save_model(model, tmp_path / 'found.yaml')
+    turned = {}
+    for day in ('mon', 'tue'):
+        (tmp_path / day).mkdir()
+        bag.rename(tmp_path / day / 'drive')
+        assert run(['simulate', '--commands', str(tmp_path / day / 'drive'), '--model',
+                    str(tmp_path / 'found.yaml'), '--out', str(tmp_path / f'{day}_sim')]) == 0
+        (tmp_path / day / 'drive').rename(bag)
+        turned[day] = read_recording(tmp_path / f'{day}_sim').stream('imu').values[-1, 0]
+    assert turned['tue'] - turned['mon'] == pytest.approx(0.2, abs=0.01)

@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from lg_husky_sim.errors import RecordingError
-from lg_husky_sim.recording import named_apart, Recording
+from lg_husky_sim.recording import named_apart, named_as_in, Recording
 import pytest
 
 
 def _read(*paths: str) -> list[Recording]:
-    return [Recording(path.rsplit('/', 1)[-1], path, {}, 0) for path in paths]
+    return [Recording(Path(path).stem, path, {}, 0) for path in paths]
 
 
 @pytest.mark.parametrize(('groups', 'names'), [
@@ -20,6 +22,10 @@ def _read(*paths: str) -> list[Recording]:
     ([['/after/rec1', '/after/rec2'], ['/before/rec1', '/before/old']],
      [['rec1', 'rec2'], ['before/rec1', 'old']]),
     ([['/rec'], ['/x/rec']], [['rec'], ['x/rec']]),
+    ([['/data/drive', '/backup/data/drive']], [['/data/drive', 'backup/data/drive']]),
+    ([['/x/one'], ['/y/data/drive', '/data/drive']],
+     [['one'], ['y/data/drive', '/data/drive']]),
+    ([['/d/drive', '/d/drive.mcap']], [['/d/drive', '/d/drive.mcap']]),
 ])
 def test_as_few_folders_as_needed(groups: list[list[str]], names: list[list[str]]) -> None:
     found = named_apart(*(_read(*group) for group in groups))
@@ -37,3 +43,19 @@ def test_a_recording_of_its_own_name_stays_the_same_object() -> None:
 def test_a_recording_given_twice_is_refused(groups: tuple[list[str], ...]) -> None:
     with pytest.raises(RecordingError, match='rec is given twice'):
         named_apart(*(_read(*group) for group in groups))
+
+
+def test_links_to_different_bags_are_different(tmp_path: Path) -> None:
+    """The name comes from where a link leads, and so does the place."""
+    for folder, link in (('mon', 'one'), ('tue', 'two')):
+        (tmp_path / folder / 'rec').mkdir(parents=True)
+        (tmp_path / link).symlink_to(tmp_path / folder / 'rec')
+    given = [Recording('rec', str(tmp_path / link), {}, 0) for link in ('one', 'two')]
+    assert [one.name for one in named_apart(given)[0]] == ['mon/rec', 'tue/rec']
+
+
+def test_a_model_finds_its_recordings_again() -> None:
+    """By the longest name that it knows; others keep their own."""
+    known = ('rec1', 'before/rec1', '/d/old')
+    found = named_as_in(_read('/d/before/rec1', '/d/after/rec1', '/d/old', '/e/old'), known)
+    assert [one.name for one in found] == ['before/rec1', 'rec1', '/d/old', 'old']
