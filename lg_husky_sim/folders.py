@@ -16,7 +16,7 @@ from lg_husky_sim.errors import SettingsError
 
 def check_folder(path: Path) -> None:
     """
-    Check that results may be written to a folder.
+    Check that results can be written to a folder, before the work that makes them.
 
     Parameters
     ----------
@@ -26,12 +26,18 @@ def check_folder(path: Path) -> None:
     Raises
     ------
     SettingsError
-        If something else is there.
+        If something else is there, or nothing can be written there.
     """
     if (path.exists() or path.is_symlink()) and not path.is_dir():
         raise SettingsError(f'{path} exists and is no folder; choose another name')
     if (path / 'metadata.yaml').is_file():
         raise SettingsError(f'{path} is a recording; choose another folder for the results')
+    target = path.resolve()
+    there = next(one for one in (target, *target.parents) if one.exists())
+    try:
+        tempfile.TemporaryDirectory(prefix='.lg_husky.', dir=there).cleanup()
+    except OSError as error:
+        raise SettingsError(f'{path} cannot be written: {there}: {error.strerror}') from error
 
 
 @contextmanager
@@ -51,18 +57,20 @@ def result_folder(path: Path, marker: str) -> Iterator[Path]:
     Yields
     ------
     pathlib.Path
-        A scratch folder beside it to write to; what is in it becomes the results when the block
-        ends without an exception, and is removed otherwise.
+        A scratch folder to write to, beside it or, where it exists, in it (it may be another file
+        system than what is beside it); what is in it becomes the results when the block ends
+        without an exception, and is removed otherwise.
 
     Raises
     ------
     SettingsError
-        If something else is at `path`, or a recording.
+        If something else is at `path`, or a recording, or nothing can be written there.
     """
     target = path.resolve()
     check_folder(target)
     target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=target.parent) as scratch:
+    with tempfile.TemporaryDirectory(
+            prefix=f'.{target.name}.', dir=target if target.is_dir() else target.parent) as scratch:
         made = Path(scratch) / 'made'
         made.mkdir()
         yield made

@@ -35,6 +35,7 @@ def _echo(recordings: tuple[str, ...], out: str | None, baseline: tuple[str, ...
     ('--baseline x y --out o -- a -b', 'a -b', 'x y', '', ''),
     ('a --set m=1 n=2 --set k=3 b --out o', 'a b', '', 'm=1 n=2 k=3', ''),
     ('a --out o --set m=1 n=2 b', 'a b', '', 'm=1 n=2', ''),
+    ('--out o --baseline x a', 'a', 'x', '', ''),
     ('--out o --free x a b', 'a b', '', '', 'x'),
     ('a --free x b --out o', 'a b', '', '', 'x'),
 ])
@@ -44,6 +45,22 @@ def test_words_go_where_they_belong(line: str, recordings: str, baseline: str, s
     report = '--no-report' not in line
     assert result.output.strip() == '|'.join((recordings, baseline, settings, free, 'o',
                                               str(report)))
+
+
+@pytest.mark.parametrize('line', ['--baseline x y a --out o', '--out o --baseline x y a b'])
+def test_words_that_may_belong_to_either_are_refused(line: str) -> None:
+    result = CliRunner().invoke(_echo, line.split())
+    assert result.exit_code != 0
+    assert 'all words follow --baseline' in result.output
+
+
+def test_a_verb_without_arguments_gives_a_flag_all_its_words() -> None:
+    command = cli.get_command(click.Context(cli), 'evaluate')
+    assert command is not None
+    words = ['--out', 'e', '--calibrate', 'a', '--held-out', 'b', 'c', '--steps', 'd', 'f']
+    context = command.make_context('evaluate', words)
+    assert context.params['held_out'] == ('b', 'c')
+    assert context.params['steps'] == ('d', 'f')
 
 
 def test_a_flag_without_its_word_is_said() -> None:

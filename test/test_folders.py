@@ -105,3 +105,22 @@ def test_results_go_into_no_file_and_no_recording(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match='bag is a recording'):
         _fill(tmp_path / 'bag', 'a')
     assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['metadata.yaml']
+
+
+def test_what_cannot_be_written_is_said_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('mine')
+    for path in (tmp_path / 'file' / 'found', Path('/proc/found')):
+        with pytest.raises(SettingsError, match=r'found cannot be written: .*(file|/proc)'):
+            check_folder(path)
+    check_folder(tmp_path / 'deep' / 'out')
+    assert [path.name for path in tmp_path.iterdir()] == ['file']
+
+
+def test_a_folder_may_be_a_file_system_of_its_own(tmp_path: Path) -> None:
+    """As in a container: nothing can be moved into it from beside it, so all is made in it."""
+    for place in (tmp_path / 'mounted', tmp_path / 'mounted'):
+        place.mkdir(exist_ok=True)
+        with result_folder(place, 'result.json') as folder:
+            assert place in folder.parents
+            (folder / 'result.json').write_text('x')
+        assert {path.name for path in place.iterdir()} == {'result.json', '.result.json.files'}

@@ -18,7 +18,7 @@ from lg_husky_sim.cli.several import SeveralWords
               help='Folder for diagnosis.json, model.yaml, report.html and the pictures.')
 @click.option('--baseline', 'baselines', multiple=True, metavar='REC [REC …]',
               help='Recordings of the same robot before a change; then the question is what '
-                   'changed. Give the recordings after it first.')
+                   'changed. Give the recordings after it first, or behind --.')
 @click.option('--robot', '--model', 'robot', type=click.Path(path_type=Path),
               metavar='FILE.yaml',
               help="Model in doubt; the Husky with the paper's parameters by default.")
@@ -75,7 +75,12 @@ def command(
         case = diagnose(after, model, progress, before,
                         Workers(jobs or os.cpu_count() or 1, scheduler))
         progress('report and pictures' if with_report else 'files', 0.95)
-        with result_folder(out, MARKER) as folder:
-            write_files(folder, case, with_report)
-    click.echo(summary_text(case.diagnosis))
+        try:
+            with result_folder(out, MARKER) as folder:
+                write_files(folder, case, with_report)
+        finally:  # the answer is worth a minute, whatever becomes of the files
+            bar.close()
+            if baselines:
+                click.echo(f'before: {", ".join(baselines)}; after: {", ".join(recordings)}')
+            click.echo(summary_text(case.diagnosis))
     click.echo(f'{out / ("report.html" if with_report else MARKER)}')

@@ -23,14 +23,28 @@ class SeveralWords(click.Command):
 
     It is those with a ``…`` in their metavar. If there is a ``=`` in it, too, they go on as long
     as words look like settings; the others up to the next option, unless nothing would be left
-    for the command's own arguments: then one word belongs to each flag.
+    for the arguments that the command needs: then one word belongs to each flag. One flag before
+    three words or more is refused, since nobody knows where its own end.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         words, arguments = self._spelt_out(args, True)
-        if not arguments:
-            words, _ = self._spelt_out(args, False)
+        needed = next((one for one in self.params
+                       if isinstance(one, click.Argument) and one.required), None)
+        if needed is not None and not arguments:
+            alone, arguments = self._spelt_out(args, False)
+            flags = [word for word in alone if self._goes_on(word)]
+            if arguments > 1 and len(flags) == 1:
+                raise click.UsageError(
+                    f'all words follow {flags[0]}, which takes several: put '
+                    f'{needed.metavar or needed.name} before it, or behind --', ctx)
+            words = alone
         return super().parse_args(ctx, words)
+
+    def _goes_on(self, word: str) -> bool:
+        # Whether it is a flag that takes whatever words follow.
+        return any('…' in (shown := one.metavar or '') and '=' not in shown
+                   for one in self.params if isinstance(one, click.Option) and word in one.opts)
 
     def _spelt_out(self, args: list[str], greedy: bool) -> tuple[list[str], int]:
         # The words with a flag before each value, and how many belong to no option.
