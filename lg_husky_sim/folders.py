@@ -69,8 +69,8 @@ def result_folder(path: Path, marker: str) -> Iterator[Path]:
     target = path.resolve()
     check_folder(target)
     target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(
-            prefix=f'.{target.name}.', dir=target if target.is_dir() else target.parent) as scratch:
+    place = target if target.is_dir() else target.parent
+    with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=place) as scratch:
         made = Path(scratch) / 'made'
         made.mkdir()
         yield made

@@ -11,6 +11,7 @@ import json
 import multiprocessing
 from pathlib import Path
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -29,6 +30,9 @@ REDRAWN = 1_000_003
 """Distance between the seeds of two draws."""
 
 TIME_LIMIT = 900.0
+INTERRUPTED = (130, -signal.SIGINT, -signal.SIGTERM)
+"""Exit codes of a command that was told to stop: it has no outcome, and is run again."""
+
 Progress = Callable[[str], None]
 
 
@@ -156,12 +160,22 @@ def command_for(folders: Folders, name: str, out: Path) -> list[str]:
 
 
 def _run(command: list[str]) -> tuple[int, str]:
-    """Run a command; return its exit code and the last line of its standard error."""
+    """
+    Run a command; return its exit code and the last line of its standard error.
+
+    Raises
+    ------
+    CommandError
+        It was interrupted.
+
+    """
     try:
         done = subprocess.run(  # noqa: S603 (our own command line)
             command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
     except subprocess.TimeoutExpired:
         return -1, f'no answer within {TIME_LIMIT:.0f} s'
+    if done.returncode in INTERRUPTED:
+        raise CommandError('interrupted; the same command goes on from here')
     lines = done.stderr.strip().splitlines()
     return done.returncode, lines[-1] if lines else ''
 

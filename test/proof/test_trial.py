@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 import shutil
+import sys
 
 from click.testing import CliRunner
 from lg_husky_sim.cli.main import cli
@@ -68,6 +69,20 @@ def test_a_trial_is_sealed_blind_resumed_and_scored(
     before = len(asked)
     assert len(list(trial.diagnose_all(prepared, sorted(sealed), 2))) == 2
     assert len(asked) == before, 'a resumed trial asks nothing again'
+
+
+@pytest.mark.parametrize('code', trial.INTERRUPTED)
+def test_what_was_interrupted_has_no_outcome(
+        prepared: trial.Folders, monkeypatch: pytest.MonkeyPatch, code: int) -> None:
+    """Ctrl-C reaches the diagnoses too; the next run asks them again."""
+    folders = trial.Folders(prepared.root / f'stopped{code}')
+    shutil.copytree(prepared.cases, folders.cases)
+    monkeypatch.setattr(trial, 'command_for', lambda *_: [
+        sys.executable, '-c', 'import os, sys; code = int(sys.argv[1])\n'
+        'os.kill(os.getpid(), -code) if code < 0 else sys.exit(code)', str(code)])
+    with pytest.raises(CommandError, match='interrupted'):
+        list(trial.diagnose_all(folders, ['case_0001'], 1))
+    assert not (folders.runs / 'case_0001' / 'outcome.json').exists()
 
 
 def test_trials_are_counted_together(prepared: trial.Folders,
