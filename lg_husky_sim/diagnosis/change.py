@@ -20,10 +20,8 @@ from lg_husky_sim.diagnosis.held_out import plant_of
 from lg_husky_sim.diagnosis.search import Progress, Search, search
 from lg_husky_sim.diagnosis.weighed import centred, weighed
 from lg_husky_sim.diagnosis.workers import HERE, Workers
-from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model_file import ModelFile
-from lg_husky_sim.identification.pieces import SETTLE
 from lg_husky_sim.identification.problem import Observations
 
 #: Most effects that the robot is given before the change is looked for.
@@ -42,7 +40,7 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     Parameters
     ----------
     whole : Observations
-        Of the earlier recordings, then of the later ones.
+        Of the earlier recordings, then of the later ones; some of either.
     baseline : collection of str
         Names of the earlier recordings.
     nominal : ModelFile
@@ -54,18 +52,8 @@ def search_change(whole: Observations, baseline: Collection[str], nominal: Model
     -------
     Search
         Its plain fit is the robot before the change.
-
-    Raises
-    ------
-    DiagnosisError
-        If one of the two sides has nothing that can be used.
     """
     earlier = [piece.recording in baseline for piece in whole.pieces]
-    if all(earlier) or not any(earlier):
-        which = 'of the recordings after the change' if all(earlier) else 'of the baseline'
-        raise DiagnosisError(
-            f'none {which} has a segment that can be used: it needs commands, '
-            f'{2.0 * SETTLE:g} s of data and wheel rates, a gyro or a pose')
     before = whole.subset(earlier)
     progress('before the change: what the base closes', 0.0)
     start = closed_base(before, nominal.structure, nominal.parameters, workers)

@@ -18,9 +18,15 @@ from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors, plant_of
 from lg_husky_sim.diagnosis.misfit import against_before, MORE
 from lg_husky_sim.diagnosis.mismatches import mismatches
+from lg_husky_sim.diagnosis.nameless import (
+    description_words,
+    no_ground_reaction,
+    rolls_without_moving,
+    unnamed_finding,
+)
 from lg_husky_sim.diagnosis.plausible import check_wheel_rates
 from lg_husky_sim.diagnosis.result import Diagnosis, Finding, Verdict
-from lg_husky_sim.diagnosis.search import Progress, Search, search
+from lg_husky_sim.diagnosis.search import MOST, Progress, Search, search
 from lg_husky_sim.diagnosis.unnamed import described, look_for_unnamed, Unnamed
 from lg_husky_sim.diagnosis.workers import HERE, Workers
 from lg_husky_sim.husky.model_file import ModelFile
@@ -119,13 +125,16 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     Raises
     ------
     RecordingError
-        If a recording cannot be used or is given twice.
+        If any recording cannot be used, or one is given twice.
     DiagnosisError
         If wheels turn faster than any do.
     """
     recordings, baseline = named_apart(recordings, baseline)
     parts = usable_segments([*baseline, *recordings])
     whole = observations(parts)
+    for recording in (*baseline, *recordings):
+        if recording.name not in whole.recordings:
+            observations(segments(recording))  # says what it lacks
     check_wheel_rates(whole, nominal)
     names = [r.name for r in recordings]
     if baseline:
@@ -144,29 +153,29 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     found = replace(found, final=ordered(found.final, whole.recordings))
     progress('numbers', 0.9)
     own = tuple(s for s in parts if s.recording in names)
-    return Case(_diagnosis(found, own, nominal, whole), found, own, nominal)
+    said = _diagnosis(found, own, nominal, whole)
+    said = replace(said, notes=(*said.notes, *_mended((*baseline, *recordings))))
+    return Case(said, found, own, nominal)
 
 
 def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
                whole: Observations) -> Diagnosis:
     names = judge.findings(found)
     verdict = Verdict.KNOWN if names else Verdict.NOTHING_MISSING
-    unnamed = None
+    unnamed, fit = None, None
     if found.change is None or not names:
         unnamed = look_for_unnamed(whole, found.final, found.change)
-    model = model_of(found.final, '; '.join(f.statement for f in names)
-                     or 'recalibrated, nothing named', with_intervals(found, nominal.parameters))
-    final = found.final
-    if judge.rolls_without_moving(whole):
-        verdict, names = Verdict.UNKNOWN, (judge.no_ground_reaction(found),)
+    if rolls_without_moving(whole):
+        verdict, names = Verdict.UNKNOWN, (no_ground_reaction(found),)
     elif unnamed is not None and (
             is_guise(found, unnamed) if names else judge.is_unnamed(
                 found, more_than_everyday(unnamed))):
         verdict = Verdict.UNKNOWN
         finding, fit = _without_name(found, whole, unnamed)
         names = (finding,)
-        if fit is not None:
-            final, model = fit, model_of(fit, finding.statement)
+    final = found.final if fit is None else fit
+    model = model_of(final, '; '.join(f.statement for f in names) or 'recalibrated, nothing named',
+                     with_intervals(found, nominal.parameters) if fit is None else ())
     residual = whole.measured - found.plain.solution.predicted
     best = found.rounds[-1].base if not found.rounds[-1].adopted else found.final
     culprit = names[0].subsystem if names else None
@@ -179,7 +188,7 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
         judge.indistinguishable(found), listed,
         judge.recalibration(found, nominal.parameters),
         errors(plant_of(found.plain), own), errors(plant_of(final), own),
-        plain_out, augmented_out, _remaining(found, unnamed), model,
+        plain_out, augmented_out, _remaining(found, final, unnamed), model,
         model_of(found.plain, 'recalibrated, nothing added'), _notes(found, verdict))
 
 
@@ -194,12 +203,12 @@ def _without_name(found: Search, whole: Observations, unnamed: Unnamed
     def cost(fit: Fit) -> float:
         return float(np.sum(held_out_cost(whole, fit, unnamed.metric, folds)))
     for base, looked in options:
-        finding, description = judge.unnamed_finding(found, looked)
+        finding, description = unnamed_finding(found, looked)
         fit = None if description is None else described(
             whole, base, found.nominal, looked, description)
         if fit is not None and description is not None:
             fit = ordered(fit, whole.recordings)
-            finding, _ = judge.unnamed_finding(found, looked.refitted(fit, description))
+            finding, _ = unnamed_finding(found, looked.refitted(fit, description))
         made.append((cost(found.final if fit is None else fit), finding, fit))
     material = max(judge.NEAR_NATS, MATERIAL * (
         cost(found.plain) - min(one[0] for one in made)))
@@ -208,9 +217,9 @@ def _without_name(found: Search, whole: Observations, unnamed: Unnamed
     return finding, fit
 
 
-def _remaining(found: Search, unnamed: Unnamed | None) -> str:
+def _remaining(found: Search, final: Fit, unnamed: Unnamed | None) -> str:
     last = found.rounds[-1]
-    residual = (found.observations.measured - found.final.solution.predicted)
+    residual = found.observations.measured - final.solution.predicted
     words = []
     for name in found.observations.channels:
         mask = found.observations.channel_mask(name)
@@ -218,11 +227,14 @@ def _remaining(found: Search, unnamed: Unnamed | None) -> str:
     best = last.rivals[0] if last.rivals and not last.adopted else None
     text = 'root mean square residual: ' + ', '.join(words)
     if best is not None:
+        full = sum(one.adopted for one in found.rounds) >= MOST
         text += (f'; the best further effect would be {best.effect.id} with a held-out gain of '
-                 f'{best.held_out:.0f} nats, which is not enough to adopt it')
-    if unnamed is not None and unnamed.held_out > 0.0:
+                 f'{best.held_out:.0f} nats, ' + (
+                     f'and {MOST} effects are as many as one diagnosis adopts' if full else
+                     'which is not enough to adopt it'))
+    if unnamed is not None and unnamed.held_out > 0.0 and final is found.final:
         first = unnamed.descriptions[0]
-        text += (f'; the best smooth description of the rest is {judge.description_words(first)}'
+        text += (f'; the best smooth description of the rest is {description_words(first)}'
                  f' with a held-out gain of {first.held_out:.0f} nats')
     return text
 
@@ -248,3 +260,12 @@ def _notes(found: Search, verdict: Verdict) -> tuple[str, ...]:
                          'as the earlier ones (mean square of the worst channel): what was named '
                          'comes near, but is not the whole of it')
     return tuple(notes)
+
+
+def _mended(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    # What reading had to repair or to go without, once for all recordings of which it is true.
+    where: dict[str, list[str]] = {}
+    for recording in recordings:
+        for note in recording.notes:
+            where.setdefault(note, []).append(recording.name)
+    return tuple(f'{", ".join(names)}: {note}' for note, names in where.items())

@@ -79,8 +79,9 @@ def labels_of(case: Case) -> tuple[str, str]:
     """Return what the two models are called in pictures."""
     names = ' + '.join(f.effect for f in case.diagnosis.findings)
     if case.diagnosis.verdict is Verdict.UNKNOWN:
-        names = 'the description' if case.diagnosis.model.structure != (
-            case.search.final.structure) else ''
+        structure = case.diagnosis.model.structure
+        names = '' if structure == case.search.plain.structure else (
+            'the nearest entry' if structure == case.search.final.structure else 'the description')
     return 'recalibrated model', f'with {names}' if names else 'recalibrated model'
 
 

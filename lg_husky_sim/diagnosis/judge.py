@@ -10,28 +10,19 @@ from dataclasses import replace
 from lg_husky_sim.diagnosis.candidates import candidates
 from lg_husky_sim.diagnosis.confidence import estimates, name_confidence, p_value
 from lg_husky_sim.diagnosis.doubts import belief, further_gain, reading_gain
-from lg_husky_sim.diagnosis.events import (
-    elements_of,
-    energy_in_moments,
-    event_words,
-    NOW_AND_THEN,
-    place_of,
-    SHOWS,
-    what_happens,
-)
+from lg_husky_sim.diagnosis.events import energy_in_moments, what_happens
 from lg_husky_sim.diagnosis.everyday import most_tried, named_rounds, open_rounds
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
-from lg_husky_sim.diagnosis.misfit import against_before, beyond_chance, farthest, is_far, trust
+from lg_husky_sim.diagnosis.misfit import against_before, beyond_chance, is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
 from lg_husky_sim.diagnosis.rivals import CHANGE_SHARE, Rival
 from lg_husky_sim.diagnosis.rounds import Round
 from lg_husky_sim.diagnosis.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
-from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
+from lg_husky_sim.diagnosis.unnamed import Unnamed
 from lg_husky_sim.husky.effects import Effect, LATER, Onset, OnsetKind, Subsystem
 from lg_husky_sim.husky.parameters import Parameters
-from lg_husky_sim.identification.problem import Observations
 import numpy as np
 
 #: Gain of a signature from which something is missing, if a refit then predicts held-out data so
@@ -58,15 +49,9 @@ SCREENED_CHANGE = 500.0
 #: Held-out gain at which nothing missing is even with something, and its width [nats]; then of a
 #: change between recordings.
 SURE = ((20.0, 6.0), (125.0, 30.0))
-#: Way per wheel angle [m/rad] below which the ground does not push the robot: a twentieth of
-#: the smallest wheel.
-NO_GRIP = 0.015
 #: A rival within this share of the winner's held-out gain, or this many nats, is as good.
 NEAR_SHARE = 0.06
 NEAR_NATS = 10.0
-#: Arguments of a smooth effort, in words.
-WHEEL_ANGLES = {'angle': "the wheel's angle", 'angle_left': "the left wheel's angle",
-                'angle_right': "the right wheel's angle"}
 #: Parameter whose sign says to which side an effect acts: positive to the left.
 SIDE_OF = {'yaw_pull': 'pull_moment'}
 
@@ -89,7 +74,8 @@ def in_words(numbers: Sequence[Estimate]) -> str:
         f'({e.low:.3g} to {e.high:.3g})' for e in numbers)
 
 
-def _side_words(effect: Effect) -> str:
+def side_words(effect: Effect) -> str:
+    """Return on which side an effect is, in words."""
     return '' if effect.side in ('none', '') else {
         'both': ' (both sides)', 'left': ' (left side)', 'right': ' (right side)'}[effect.side]
 
@@ -112,7 +98,8 @@ def _is_given(search: Search) -> bool:
         change.kind, change.recording, change.value)
 
 
-def _rivals(one: Round, named: Effect | None) -> tuple[Rivalry, ...]:
+def rivals_of(one: Round, named: Effect | None) -> tuple[Rivalry, ...]:
+    """Return what else was tried in a round, best first."""
     # Each effect once, by the best of its sides and shapes.
     best: dict[str, Rivalry] = {}
     for r in one.rivals:
@@ -151,14 +138,14 @@ def findings(search: Search) -> tuple[Finding, ...]:
         regime = where_it_shows(observations, gain)
         onset = final.structure.onset if effect.late and not _is_given(search) else None
         changed = 'this has changed: ' if effect.again else ''
-        statement = (f'{changed}{effect.kind.title}{_side_words(effect)}{onset_words(onset)}: '
+        statement = (f'{changed}{effect.kind.title}{side_words(effect)}{onset_words(onset)}: '
                      f'{in_words(numbers)}. It shows {regime} and explains '
                      f'{100.0 * min(max(one.share, 0.0), 1.0):.0f} % of what was unexplained.')
         found.append(Finding(
             effect.id, _acting_side(effect, numbers), effect.kind.subsystem.value,
             effect.kind.elements, regime, onset, numbers,
             best.held_out, p_value(best.gain, len(names), hypotheses), one.share,
-            _rivals(one, effect), statement[0].upper() + statement[1:]))
+            rivals_of(one, effect), statement[0].upper() + statement[1:]))
     return tuple(found)
 
 
@@ -221,134 +208,6 @@ def is_unnamed(search: Search, unnamed: Unnamed | None) -> bool:
         return False
     turns = unnamed.descriptions[0].effect.kind.subsystem is Subsystem.ROTATION
     return unnamed.confirmed > CONFIRMED or (unnamed.held_out > SMOOTH and not turns)
-
-
-def rolls_without_moving(observations: Observations) -> bool:
-    """
-    Return whether the wheels turn and the robot does not follow.
-
-    Parameters
-    ----------
-    observations : Observations
-
-    Returns
-    -------
-    bool
-        True where the measured way is unrelated to that of the wheels at all.
-    """
-    ways: list[float] = []
-    rolled: list[float] = []
-    for piece in observations.pieces:
-        by_name = {channel.name: channel for channel in piece.channels}
-        if not {'wheel_left', 'wheel_right', 'advance'} <= set(by_name):
-            return False
-        advance = by_name['advance']
-        sides = [np.interp(advance.times, by_name[n].times, by_name[n].values)
-                 for n in ('wheel_left', 'wheel_right')]
-        ways.extend(advance.values)
-        rolled.extend(0.5 * (sides[0] + sides[1]))
-    wheel, way = np.array(rolled), np.clip(np.array(ways), -3.0, 3.0)
-    if wheel.size < 50 or float(np.std(wheel)) < 0.3:
-        return False
-    per_rate = float(wheel @ way / (wheel @ wheel))
-    return abs(per_rate) < NO_GRIP
-
-
-def no_ground_reaction(search: Search) -> Finding:
-    """
-    Return the finding for wheels that turn off the ground.
-
-    Parameters
-    ----------
-    search : Search
-
-    Returns
-    -------
-    Finding
-    """
-    first = search.rounds[0]
-    gain = max((r.held_out for r in first.rivals), default=0.0)
-    return Finding(
-        'unknown', 'both', 'traction', ('B_FL', 'B_RL', 'B_FR', 'B_RR', 'M_H', 'J_H'),
-        'whenever the wheels turn', None, (), gain, 0.0, 0.0, _rivals(first, None),
-        'There is no ground reaction: the wheels turn as commanded and the robot stays where it '
-        'is. The wheels are off the ground, or the pose is not that of this robot.')
-
-
-def description_words(description: Description) -> str:
-    """Return a smooth description in words."""
-    effect = description.effect
-    shape = WHEEL_ANGLES.get(effect.shape, effect.shape.replace('_', ' '))
-    words = effect.kind.title.replace('{shape}', shape)
-    return words + _side_words(effect)
-
-
-def distance_words(search: Search) -> str:
-    """Return in a sentence how far the data are from the model."""
-    channel, square, _ = farthest(search)
-    than = ('noise' if search.change is None else 'distance in the earlier recordings, errors '
-            'taken off that may be alike in all')
-    return (f'The {channel.replace("_", " ")} is far from the model: {square:.1f} times its '
-            f'{than} (mean square).')
-
-
-def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Description | None]:
-    """
-    Return the finding of an unknown effect.
-
-    Parameters
-    ----------
-    search : Search
-    unnamed : Unnamed
-
-    Returns
-    -------
-    Finding
-        With the most likely subsystem.
-    Description or None
-        The description to put into the model, where it predicts held-out data better.
-    """
-    first, seen = open_rounds(search)[0], what_happens(search)
-    rivals = _rivals(first, None)
-    near = max(first.rivals, key=lambda r: r.held_out, default=None)
-    best = unnamed.descriptions[0] if unnamed.descriptions else None
-    described = best is not None and best.held_out > DESCRIBED and unnamed.share > 0.0
-    if described and best is not None and (near is None or best.held_out > 0.5 * near.held_out):
-        kind = best.effect.kind
-        words = (f'Something is missing that is not in the catalogue. It is described best by '
-                 f'{description_words(best)}, between {min(best.knots):.3g} and '
-                 f'{max(best.knots):.3g} {kind.parameters[-1].unit}.')
-        if first.adopted:
-            words += (f' The nearest entry, {first.rivals[0].effect.id}, leaves too much to be '
-                      'its name.')
-        gain = best.held_out
-    elif seen and (near is None or near.held_out < DESCRIBED):
-        return Finding('unknown', 'none', place_of(seen).value, elements_of(seen), NOW_AND_THEN,
-                       None, (), 0.0, 0.0, 0.0, rivals, 'Something is missing that is not in the '
-                       f'catalogue, and nothing in it comes near. {event_words(seen)}'), None
-    elif near is None and not first.scores:
-        channel, _, _ = farthest(search)
-        return Finding('unknown', 'none', SHOWS[channel].value, (), 'not determined', None, (),
-                       0.0, 0.0, 0.0, (), 'Something is missing that is not in the catalogue, '
-                       f'and nothing in it comes near. {distance_words(search)}'), None
-    else:
-        effect = near.effect if near is not None else first.scores[0].signature.candidate.effect
-        kind = effect.kind
-        gain = near.held_out if near is not None else first.scores[0].gain
-        doubt = ('leaves too much to be its name' if first.adopted else 'that not steadily '
-                 'enough over held-out stretches to be its name')
-        words = (f'Something is missing that is not in the catalogue; the nearest entry, '
-                 f'{effect.id}, explains {100.0 * max(first.share, 0.0):.1f} % of it, and '
-                 f'{doubt}.')
-    place, elements, regime = kind.subsystem, kind.elements, 'not determined'
-    if seen:
-        place, elements, regime = place_of(seen), elements_of(seen), NOW_AND_THEN
-        words += f' {event_words(seen)}'
-    elif is_far(search):
-        words += f' {distance_words(search)}'
-    return Finding('unknown', 'none', place.value, elements, regime, None, (), gain,
-                   p_value(gain, 9, len(candidates())), unnamed.share, rivals,
-                   words), best if described else None
 
 
 def confidence(search: Search, verdict: Verdict, unnamed: Unnamed | None = None) -> float:

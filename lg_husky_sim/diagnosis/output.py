@@ -55,11 +55,12 @@ def summary_text(diagnosis: Diagnosis) -> str:
     lines = [f'{headline(diagnosis)} (confidence {diagnosis.confidence:.2f})']
     for finding in diagnosis.findings:
         lines.append(f'  {finding.effect}: {finding.statement}')
-        chance = f'= {finding.p_value:.1g}' if finding.p_value > 0.0 else '< 1e-300'
+        evidence = f'held-out gain {finding.held_out_gain:.0f} nats, {finding.chance}; ' if (
+            finding.chance) else ''
         rivals = [f'{r.effect} {r.held_out_gain:.0f}' for r in finding.rivals
                   if r.held_out_gain > 0.0]
-        lines.append(f'    held-out gain {finding.held_out_gain:.0f} nats, p {chance}; '
-                     f'rivals: {", ".join(rivals) or "none that predicts better than nothing"}')
+        lines.append(f'    {evidence}rivals: '
+                     f'{", ".join(rivals) or "none that predicts better than nothing"}')
     for group in diagnosis.indistinguishable:
         lines.append(f'  not told apart: {", ".join(group.effects)}; '
                      f'would tell: {"; ".join((*group.sensors, *group.manoeuvres))}')

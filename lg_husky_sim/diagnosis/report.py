@@ -294,7 +294,6 @@ def _finding(finding: Finding) -> dict[str, Any]:
             'title': effect_kind(finding.effect).title if known else 'an unknown effect',
             'numbers': [_number(e, None) for e in finding.parameters],
             'gain': f'{finding.held_out_gain:.0f}',
-            'chance': (f'= {finding.p_value:.1g}' if finding.p_value > 1e-99 else '< 1e-99'),
             'share': f'{100.0 * min(max(finding.share, 0.0), 1.0):.0f} %',
             'rivals': [(r.effect, r.side, f'{r.held_out_gain:.0f}') for r in finding.rivals]}
 

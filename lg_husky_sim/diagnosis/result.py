@@ -14,6 +14,10 @@ from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model_file import ModelFile
 
 SCHEMA = 'lg_husky_sim/diagnosis/1'
+#: Errors that stand in the JSON even where they cannot be told, as null.
+MAIN_ERRORS = ('position_rmse_m', 'yaw_rate_rmse', 'wheel_speed_rmse')
+#: Below it a p value is given as less than it.
+LEAST_CHANCE = 1e-99
 
 
 class Verdict(enum.Enum):
@@ -74,7 +78,8 @@ class Finding:
     held_out_gain : float
         On blocks that were not fitted [nats].
     p_value : float
-        Of the drop of the sum of squares, corrected for the number of hypotheses.
+        Of the drop of the sum of squares, corrected for the number of hypotheses; not a number
+        where the finding is not one of such a drop.
     share : float
         Share of the unexplained energy that it explains.
     rivals : tuple of Rivalry
@@ -94,6 +99,14 @@ class Finding:
     share: float
     rivals: tuple[Rivalry, ...]
     statement: str
+
+    @property
+    def chance(self) -> str:
+        """The p value in words; empty where there is none."""
+        if math.isnan(self.p_value):
+            return ''
+        return f'p = {self.p_value:.1g}' if self.p_value > LEAST_CHANCE else (
+            f'p < {LEAST_CHANCE:.0g}')
 
 
 @dataclass(frozen=True)
@@ -170,6 +183,11 @@ def _numbers(values: Mapping[str, float]) -> dict[str, float | None]:
     return {name: _number(value) for name, value in values.items()}
 
 
+def _errors(values: Mapping[str, float]) -> dict[str, float | None]:
+    # The main ones are there whatever was recorded.
+    return {**dict.fromkeys(MAIN_ERRORS), **_numbers(values)}
+
+
 def onset_data(onset: Onset | None) -> dict[str, Any]:
     """Return an onset as it stands in the JSON."""
     if onset is None:
@@ -229,9 +247,9 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
              'strength_sigma': _number(m.strength), 'subsystem': m.subsystem}
             for m in diagnosis.mismatch],
         'recalibration': [_estimate_data(e) for e in diagnosis.recalibration],
-        'fit': {'plain': _numbers(diagnosis.plain), 'augmented': _numbers(diagnosis.augmented),
-                'held_out': {'plain': _numbers(diagnosis.held_out_plain),
-                             'augmented': _numbers(diagnosis.held_out_augmented)}},
+        'fit': {'plain': _errors(diagnosis.plain), 'augmented': _errors(diagnosis.augmented),
+                'held_out': {'plain': _errors(diagnosis.held_out_plain),
+                             'augmented': _errors(diagnosis.held_out_augmented)}},
         'remaining': diagnosis.remaining,
         'notes': list(diagnosis.notes),
     }

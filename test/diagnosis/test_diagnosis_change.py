@@ -15,7 +15,7 @@ from lg_husky_sim.diagnosis.closed_base import closed_base
 from lg_husky_sim.diagnosis.diagnose import Case, diagnose
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.errors import DiagnosisError
+from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.effects import Effect, OnsetKind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
@@ -127,14 +127,15 @@ def test_it_may_change_within_a_recording() -> None:
     assert onset.value == pytest.approx(9.0, abs=0.7)
 
 
-@pytest.mark.parametrize(('short', 'named'), [
-    ('base', 'of the baseline'), ('rec', 'of the recordings after the change')])
-def test_a_side_without_data_is_refused(short: str, named: str) -> None:
-    pair = {name: driven(name, {}, 1) for name in ('base', 'rec')}
-    pair[short] = Recording(short, short, {
-        name: series.slice(0.0, 0.5) for name, series in pair[short].streams.items()}, 0)
-    with pytest.raises(DiagnosisError, match=f'none {named} has a segment'):
-        diagnose([pair['rec']], load_model(), lambda text, share: None, [pair['base']])
+@pytest.mark.parametrize('short', ['base', 'rec', 'rec2'])
+def test_a_recording_that_cannot_be_used_is_refused(short: str) -> None:
+    """However many others can be."""
+    given = {name: driven(name, {}, 1) for name in ('base', 'rec', 'rec2')}
+    given[short] = Recording(short, short, {
+        name: series.slice(0.0, 0.5) for name, series in given[short].streams.items()}, 0)
+    with pytest.raises(RecordingError, match=f'no usable segment in {short}: '):
+        diagnose([given['rec'], given['rec2']], load_model(), lambda text, share: None,
+                 [given['base']])
 
 
 def test_an_open_loop_is_no_closed_base() -> None:

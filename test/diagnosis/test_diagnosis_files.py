@@ -13,11 +13,11 @@ import re
 from typing import Any
 
 from lg_husky_sim.cli.main import run
-from lg_husky_sim.diagnosis.diagnose import Case
+from lg_husky_sim.diagnosis.diagnose import _mended, Case
 from lg_husky_sim.diagnosis.figures import channel_rows, new_elements, rivals_figure
 from lg_husky_sim.diagnosis.output import write_files
 from lg_husky_sim.diagnosis.report import new_terms
-from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.result import diagnosis_data, Verdict
 from lg_husky_sim.husky.effects import catalogue
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import read_recording, Recording, write_recording
@@ -42,6 +42,23 @@ def folder(tmp_path_factory: Any, drive: Callable[..., Recording]) -> Path:
     write_recording(bag, made.streams, frames=('odom', 'base_link'))
     assert run(['diagnose', str(bag), '--out', str(place / 'out')]) == 0
     return place / 'out'
+
+
+def test_what_reading_mended_is_said_once() -> None:
+    one, two = (Recording(name, name, {}, 0, notes=('wheels: sorted', *more))
+                for name, more in (('rec1', ()), ('rec2', ('imu: 3 of 9 are not finite',))))
+    assert _mended([one, two]) == (
+        'rec1, rec2: wheels: sorted', 'rec2: imu: 3 of 9 are not finite')
+
+
+def test_main_errors_are_there_without_their_channels(
+        diagnosed: Callable[[str], Case]) -> None:
+    """A recording without a pose, or too short to hold a part out, has them as null."""
+    bare = diagnosis_data(replace(diagnosed('nothing').diagnosis, held_out_plain={},
+                                  augmented={'yaw_rate_rmse': 0.25}))['fit']
+    assert bare['held_out']['plain'] == {
+        'position_rmse_m': None, 'yaw_rate_rmse': None, 'wheel_speed_rmse': None}
+    assert bare['augmented']['yaw_rate_rmse'] == 0.25
 
 
 def _number(value: object) -> bool:

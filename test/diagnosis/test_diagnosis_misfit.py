@@ -6,18 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+import math
 
 from lg_husky_sim.diagnosis.alike import with_common_errors
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.diagnose import _notes
 from lg_husky_sim.diagnosis.doubts import belief, is_guise, reading_gain
 from lg_husky_sim.diagnosis.fits import Fit, fit_structure, recalibrate, shared_metric
-from lg_husky_sim.diagnosis.judge import (
-    confidence,
-    description_words,
-    is_unnamed,
-    unnamed_finding,
-)
+from lg_husky_sim.diagnosis.judge import confidence, is_unnamed
 from lg_husky_sim.diagnosis.misfit import (
     against_before,
     beyond_chance,
@@ -26,6 +22,7 @@ from lg_husky_sim.diagnosis.misfit import (
     ratios,
     trust,
 )
+from lg_husky_sim.diagnosis.nameless import description_words, unnamed_finding
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.rivals import Rival
 from lg_husky_sim.diagnosis.rounds import Round
@@ -246,3 +243,7 @@ def test_unknown_by_distance_alone_names_the_channel(data: Observations, plain: 
     finding, description = unnamed_finding(search, Unnamed((), 1.0, 1, search.rounds[0].metric))
     assert (finding.effect, finding.subsystem, description) == ('unknown', 'translation', None)
     assert 'The advance is far from the model' in finding.statement
+    assert math.isnan(finding.p_value)
+    assert finding.chance == ''
+    assert replace(finding, p_value=0.003).chance == 'p = 0.003'
+    assert replace(finding, p_value=0.0).chance == 'p < 1e-99'

@@ -94,6 +94,7 @@ def test_name_that_leaves_an_effort_elsewhere_is_a_guise(record: Record) -> None
     both = diagnosed(record, {**scrub, FORCE: AHEAD})
     assert [r.rivals[0].effect.id for r in both.search.rounds if r.adopted]
     assert both.diagnosis.verdict is Verdict.UNKNOWN
+    assert both.diagnosis.model.about == both.diagnosis.findings[0].statement
 
 
 def test_smooth_effort_moves_the_recalibration_along(record: Record) -> None:

@@ -12,7 +12,7 @@ from lg_husky_sim.diagnosis import closed_base
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.closed_base import starts, TYRES, with_adhesion
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
-from lg_husky_sim.diagnosis.judge import _rivals
+from lg_husky_sim.diagnosis.judge import rivals_of
 from lg_husky_sim.diagnosis.rivals import rank, Rival
 from lg_husky_sim.diagnosis.rounds import is_eased, Round
 from lg_husky_sim.diagnosis.search import search
@@ -104,8 +104,8 @@ def test_ground_limits_and_rivals_are_what_they_are_called(record: Record) -> No
     metric = Metric(np.ones(1), {})
     sides = [Rival(Effect('viscous_asymmetry', side), None, fit, 100.0, gain)
              for side, gain in (('left', 30.0), ('right', 70.0))]
-    listed = _rivals(Round(fit, (), (*sides, Rival(Effect('payload'), None, fit, 100.0, 50.0)),
-                           metric, 0.5, True), Effect('payload'))
+    listed = rivals_of(Round(fit, (), (*sides, Rival(Effect('payload'), None, fit, 100.0, 50.0)),
+                             metric, 0.5, True), Effect('payload'))
     assert [(one.effect, one.side, one.held_out_gain) for one in listed] == [
         ('viscous_asymmetry', 'right', 70.0)]
     ground, other = (Rival(Effect(name), None, fit, 100.0, gain) for name, gain in (
