@@ -100,9 +100,11 @@ def _from_folder(folder: Path) -> tuple[Rival, Rival]:
         raise SettingsError(
             f'{place} names no effect with a rival; there is nothing to tell apart')
     plain, model = load_model(folder / 'plain.yaml'), load_model(folder / 'model.yaml')
-    kept = {e.id for e in plain.structure.effects}
-    first = next(e for e in model.structure.effects
-                 if e.id == name and (e.again or e.id not in kept))
+    first = next((e for e in model.structure.effects
+                  if e.id == name and e not in plain.structure.effects), None)
+    if first is None:
+        raise SettingsError(f'{folder / "model.yaml"} has no {name} that plain.yaml has not, and '
+                            f'{place} names it: these are not of one diagnosis')
     found = typical(name, plain.structure, model.parameters, first.side)
     numbers = {p.name: model.parameters[p.name] for p in first.parameters()}
     one = Rival(name, found.structure, found.parameters.replacing(numbers), (numbers,))

@@ -21,6 +21,7 @@ from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.rival import rival_prediction
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.recording import Recording, Segment, segments, windows
+from lg_husky_sim.recording.names import printable
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 
@@ -187,7 +188,7 @@ def as_json(
         'overall': {name: {'rmse': _rmse(everything[name])} for name in names},
         'recordings': [{
             'name': outcome.recording.name,
-            'path': outcome.recording.path,
+            'path': printable(outcome.recording.path),
             'notes': list(outcome.recording.notes),
             'results': {name: {'rmse': _rmse(outcome.errors(name)),
                                'bounds_m': _bounds(outcome.bounds(name))} for name in names},

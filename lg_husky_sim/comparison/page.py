@@ -24,6 +24,7 @@ from lg_husky_sim.comparison.outcome import (
     text_table,
 )
 from lg_husky_sim.extras import require
+from lg_husky_sim.recording.names import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -143,7 +144,7 @@ def _page(
         trim_blocks=True, lstrip_blocks=True)
     recordings = [{
         'name': outcome.recording.name,
-        'path': outcome.recording.path,
+        'path': printable(outcome.recording.path),
         'seconds': sum(part.segment.duration for part in outcome.segments),
         'segments': len(outcome.segments),
         'rows': _rows(outcome, names),

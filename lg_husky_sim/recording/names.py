@@ -73,6 +73,11 @@ def named_as_in(recordings: Sequence[Recording], known: Collection[str]
     return tuple(found)
 
 
+def printable(text: str) -> str:
+    """Return the name of a file as pages and JSON can hold it: not all such names are UTF-8."""
+    return text.encode('utf-8', 'replace').decode()
+
+
 def _apart(group: Sequence[Recording], taken: set[str]) -> list[str]:
     # Each with as few folders as tell it from the others and from what is taken.
     ladders = [_ladder(recording) for recording in group]

@@ -15,6 +15,7 @@ from lg_husky_sim.recording.clean import clean, joined, Sample, wheel_streams
 from lg_husky_sim.recording.clock import common_clock
 from lg_husky_sim.recording.decode import Collected, COLLECTORS, edge_name, Rows
 from lg_husky_sim.recording.frames import compose, Edge, pose_chain
+from lg_husky_sim.recording.names import printable
 from lg_husky_sim.recording.recording import CHANNELS, Recording
 from lg_husky_sim.recording.topics import candidates, listing, ODOMETRY, Topic, TopicMap, TYPES
 from lg_husky_sim.signals import TimeSeries
@@ -144,8 +145,9 @@ def _recording(
     streams, sources = _streams(samples, chain, origin, notes)
     if not streams:
         raise RecordingError('; '.join(['no sample of use', *notes]))
+    name = path.stem if path.suffix in SUFFIXES else path.resolve().name
     return Recording(
-        name=path.stem if path.suffix in SUFFIXES else path.resolve().name,
+        name=printable(name),
         path=str(path),
         streams=streams,
         start_ns=start_ns,

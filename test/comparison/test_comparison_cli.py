@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 import json
+import os
 from pathlib import Path
 import re
 from typing import Any
@@ -256,3 +257,10 @@ def test_a_model_knows_its_recordings_by_their_folders(bag: Path, tmp_path: Path
         (tmp_path / day / 'drive').rename(bag)
         turned[day] = read_recording(tmp_path / f'{day}_sim').stream('imu').values[-1, 0]
     assert turned['tue'] - turned['mon'] == pytest.approx(0.2, abs=0.01)
+
+
+def test_a_name_that_is_not_utf_8_is_no_reason_to_lose_results(bag: Path, tmp_path: Path) -> None:
+    place = bag.rename(tmp_path / os.fsdecode(b'caf\xe9'))
+    assert run(['compare', str(place), '--out', str(tmp_path / 'result')]) == 0
+    data = json.loads((tmp_path / 'result' / 'compare.json').read_text(encoding='utf-8'))
+    assert data['recordings'][0]['name'] == 'caf?'

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from lg_husky_sim.cli.main import run
 from lg_husky_sim.diagnosis.planning import drives, imitated, named_drive, plan, typical
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
-from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.husky.model_file import load_model, save_model
 from lg_husky_sim.manoeuvres import load_manoeuvre
 import numpy as np
 import pytest
@@ -88,3 +89,13 @@ def test_an_effect_that_is_there_is_taken_with_other_numbers() -> None:
     assert found.structure.effects[-1].again
     plant = compile_model(found.structure).at(found.parameters)
     assert plant.sets[0].command.latency == found.parameters['latency_later'] != 0.1
+
+
+def test_folder_of_two_diagnoses_is_refused(tmp_path: Path, capsys: Any) -> None:
+    """The finding is in the model that the diagnosis wrote, or the files were mixed up."""
+    for name in ('plain.yaml', 'model.yaml'):
+        save_model(load_model(), tmp_path / name)
+    (tmp_path / 'diagnosis.json').write_text(json.dumps({'findings': [{
+        'effect': 'slope', 'rivals': [{'effect': 'gyro_bias', 'side': 'none'}]}]}))
+    assert run(['plan-drive', str(tmp_path), '--out', str(tmp_path / 's.yaml')]) == 1
+    assert 'model.yaml has no slope that plain.yaml has not' in capsys.readouterr().err
