@@ -99,14 +99,14 @@ def share(plain: float, augmented: float, truth: float, least: float = 0.1) -> f
     -------
     float or None
         (plain - augmented) / (plain - truth): 1 is as good as knowing the hidden robot,
-        below 0 is worse than the plain model. None where less than `least` of the plain
-        error could be gained, so that there is nothing to reach.
+        below 0 is worse than the plain model, and a model that runs away is -1. None where less
+        than `least` of the plain error could be gained, so that there is nothing to reach.
 
     """
     achievable = plain - truth
     if not math.isfinite(achievable) or achievable < least * plain:
         return None
-    return (plain - augmented) / achievable
+    return (plain - augmented) / achievable if math.isfinite(augmented) else -1.0
 
 
 def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:

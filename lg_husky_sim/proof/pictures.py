@@ -62,7 +62,7 @@ def plot_rates(axes: Axes, results: Json) -> None:
 
 
 def plot_shares(axes: Axes, results: Json) -> None:
-    """Draw the median share of the achievable improvement for each hidden effect."""
+    """Draw the median share of the achievable improvement by effect, without a baseline."""
     rows = [(name, row['median_share']) for name, row in results['by_effect'].items()
             if row['median_share'] is not None]
     rows.sort(key=lambda row: row[1])
@@ -72,7 +72,8 @@ def plot_shares(axes: Axes, results: Json) -> None:
     axes.axvline(0.85, color='black', linewidth=1)
     axes.axvline(1.0, color='#969696', linewidth=0.5)
     axes.set_yticks(range(len(rows)), [name for name, _ in rows], fontsize=7)
-    axes.set_xlabel('share of the achievable held-out improvement (black line: target)')
+    axes.set_xlabel('share of the achievable held-out improvement, robots without a baseline '
+                    '(black line: target)')
     axes.set_xlim(-0.55, 1.25)
 
 

@@ -27,16 +27,16 @@ class Judgement:
     case, kind, world, drive, effects, severities
         The case, as the answer says.
     failed
-        Why there is no diagnosis, or ''.
+        Why there is no diagnosis, or no drive of its model, or ''.
     verdict
         'nothing_missing', 'known', 'unknown' or '' (failed).
     named
         Effects that were named, in order; 'unknown' where the finding says so.
     first
         `named` or inner ones: the first name, 'unknown', 'nothing' or 'failed'.
-    top1, top2, subsystem, side
-        The first name, one of the first two or declared inseparable, the first
-        subsystem, the side are right (None: not asked).
+    top1, top2, nearest, subsystem, side
+        The first name, one of the first two or declared inseparable, the same or the nearest
+        entry of an "unknown", the first subsystem, the side are right (None: not asked).
     found
         How many of the hidden effects are among the names.
     extra
@@ -53,7 +53,7 @@ class Judgement:
         An onset was given where there is none.
     shares
         Share of the achievable held-out improvement ('all' and 'position_m'), None where
-        nothing could be gained.
+        nothing could be gained; 0 where a failure left nothing to measure.
     seconds
         Run time of the diagnosis.
 
@@ -71,6 +71,7 @@ class Judgement:
     first: str
     top1: bool
     top2: bool
+    nearest: bool
     subsystem: bool
     side: bool | None
     found: int
@@ -89,17 +90,14 @@ def _declared(diagnosis: Json, named: str, truth: str) -> bool:
                for item in diagnosis.get('indistinguishable', ()))
 
 
-def _second(findings: Sequence[Json]) -> list[str]:
-    """Return the first name and its next candidate: the best rival, or the next finding."""
-    names = [str(findings[0].get('effect'))] if findings else []
-    rivals = sorted(findings[0].get('rivals') or (), reverse=True,
-                    key=lambda rival: float(rival.get('held_out_gain_nats') or -math.inf)) \
-        if findings else []
+def _second(findings: Sequence[Json]) -> str:
+    """Return the name that stands second: the next finding, else the best rival, or ''."""
     if len(findings) > 1:
-        names.append(str(findings[1].get('effect')))
-    if rivals:
-        names.append(str(rivals[0].get('effect')))
-    return names
+        return str(findings[1].get('effect'))
+    rivals = findings[0].get('rivals') or () if findings else ()
+    best: Json = max(rivals, default={}, key=lambda rival: float(
+        rival.get('held_out_gain_nats') or -math.inf))
+    return str(best.get('effect', ''))
 
 
 def _onset_error(truth: Json, findings: Sequence[Json]) -> float:
@@ -124,7 +122,9 @@ def _begins_later(said: Json) -> bool:
     return str(said.get('kind', 'none')) != 'none'
 
 
-def _shares(held_out: Sequence[Json]) -> dict[str, float | None]:
+def _shares(held_out: Sequence[Json], failed: bool) -> dict[str, float | None]:
+    if failed and not held_out:
+        return dict.fromkeys(('all', 'position_m'), 0.0)
     result: dict[str, float | None] = {}
     for name in ('all', 'position_m'):
         sums = {who: math.sqrt(sum(float(item[who][name]) ** 2 for item in held_out))
@@ -160,8 +160,11 @@ def judge(answer: Json, outcome: Json) -> Judgement:
     known = [name for name in named if name in catalogue.SUBSYSTEM]
     truths = set(hidden)
     top1 = bool(hidden) and first in truths
-    top2 = top1 or any(name in truths for name in _second(findings)) or any(
+    second = _second(findings) in truths or any(
         _declared(diagnosis, name, truth) for name in named[:1] for truth in hidden)
+    # Rivals of an "unknown" were refused as names.
+    top2, nearest = top1 or (second and verdict == 'known'), top1 or second
+    failed = str(outcome.get('error') or outcome.get('held_out_error') or '')
     places = {catalogue.subsystem(name) for name in hidden}
     place = str(findings[0].get('subsystem')) if findings else ''
     right_place = place in places
@@ -181,10 +184,10 @@ def judge(answer: Json, outcome: Json) -> Judgement:
         case=str(answer['case']), kind=spec['kind'], world=spec['world'], drive=spec['drive'],
         effects=tuple(hidden),
         severities=tuple(item['severity'] for item in answer['effects']),
-        failed=str(outcome.get('error') or ''), verdict=verdict, named=named, first=first,
-        top1=top1, top2=top2, subsystem=right_place, side=side,
+        failed=failed, verdict=verdict, named=named, first=first,
+        top1=top1, top2=top2, nearest=nearest, subsystem=right_place, side=side,
         found=len(truths & set(named)), extra=len([n for n in known if n not in truths]),
         acceptable=acceptable and bool(diagnosis), onset_kind=onset['kind'],
         onset_error=error, onset_invented=invented,
-        shares=_shares(outcome.get('held_out') or ()),
+        shares=_shares(outcome.get('held_out') or (), bool(failed)),
         seconds=float(outcome.get('seconds') or math.nan))

@@ -15,6 +15,9 @@ from lg_husky_sim.proof.scoring import Judgement
 import numpy as np
 from numpy.typing import NDArray
 
+WITH_BASELINE = ('g2', 'g3')
+"""Worlds whose robots are asked what changed since baseline recordings."""
+
 
 @dataclass(frozen=True)
 class Rate:
@@ -67,16 +70,19 @@ def rates(cases: Sequence[Judgement]) -> tuple[Rate, ...]:
         _rate('medium and strong: named right', clear, lambda c: c.top1, 0.80),
         _rate('medium and strong: among the first two or declared inseparable', clear,
               lambda c: c.top2, 0.92),
+        _rate('medium and strong: the same, or the nearest entry of an "unknown"', clear,
+              lambda c: c.nearest),
         _rate('medium and strong: subsystem right', clear, lambda c: c.subsystem, 0.92),
         _rate('weak: named right', weak, lambda c: c.top1),
-        _rate('weak: nothing or unknown rather than a wrong name', weak,
+        _rate('weak: named right, nothing or unknown, and no wrong name', weak,
               lambda c: c.top1 or c.first in ('nothing', 'unknown')),
-        _rate('singles: another effect named beside', [c for c in clear if c.top1],
-              lambda c: c.extra > 0),
-        _rate('clean: named or called unknown (false alarm)', clean,
-              lambda c: c.verdict in ('known', 'unknown'), 0.05, at_most=True),
+        _rate('medium and strong, named right: another effect named beside',
+              [c for c in clear if c.top1], lambda c: c.extra > 0),
+        _rate('clean: named, called unknown or failed (false alarm)', clean,
+              lambda c: c.verdict != 'nothing_missing', 0.05, at_most=True),
         _rate('pairs: at least one right', pairs, lambda c: c.found >= 1, 0.90),
         _rate('pairs: both right', pairs, lambda c: c.found >= 2, 0.60),
+        _rate('pairs: an effect named that is not there', pairs, lambda c: c.extra > 0),
         _rate('outside the catalogue: unknown, or place right without a confident name',
               outside, lambda c: c.acceptable, 0.80),
         _rate('outside the catalogue: noticed', outside,
@@ -90,7 +96,8 @@ def rates(cases: Sequence[Judgement]) -> tuple[Rate, ...]:
         _rate('onset at a place within 0.5 m (effect named right)', placed,
               lambda c: (c.onset_error or 0.0) <= 0.5),
         _rate('an onset said where there is none', whole, lambda c: c.onset_invented),
-        _rate('no diagnosis (error)', cases, lambda c: bool(c.failed), 0.0, at_most=True),
+        _rate('no diagnosis, or no drive of its model (error)', cases,
+              lambda c: bool(c.failed), 0.0, at_most=True),
     )
 
 
@@ -103,12 +110,21 @@ def _quantiles(values: Sequence[float]) -> dict[str, Any]:
 
 
 def shares(cases: Sequence[Judgement]) -> dict[str, Any]:
-    """Return medians and quartiles of the share of the achievable improvement."""
+    """
+    Return medians and quartiles of the share of the achievable improvement.
+
+    Against a baseline the share also counts what the diagnosis learnt of the base beforehand,
+    which the plain model does not have: these cases stand apart, with the clean ones.
+    """
     result = {}
+    alone = [c for c in cases if c.world not in WITH_BASELINE]
+    against = [c for c in cases if c.world in WITH_BASELINE]
     for name in ('all', 'position_m'):
         for label, chosen in (
-                ('known effects', [c for c in cases if c.kind in ('single', 'pair')]),
-                ('outside the catalogue', [c for c in cases if c.kind == 'outside'])):
+                ('known effects', [c for c in alone if c.kind in ('single', 'pair')]),
+                ('outside the catalogue', [c for c in alone if c.kind == 'outside']),
+                ('against a baseline', [c for c in against if c.kind != 'clean']),
+                ('against a baseline, clean', [c for c in against if c.kind == 'clean'])):
             values = [value for c in chosen if (value := c.shares.get(name)) is not None]
             result[f'{label}, {name}'] = _quantiles(values)
     return result
@@ -121,7 +137,11 @@ def seconds(cases: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def by_effect(cases: Sequence[Judgement]) -> dict[str, Any]:
-    """Return, for each hidden effect alone, how often it was named right and as what else."""
+    """
+    Return, for each hidden effect alone, how often it was named right and as what else.
+
+    The median share is that of the robots that come without a baseline.
+    """
     result: dict[str, Any] = {}
     for case in cases:
         if case.kind not in ('single', 'outside'):
@@ -132,7 +152,7 @@ def by_effect(cases: Sequence[Judgement]) -> dict[str, Any]:
         row['right'] += case.top1
         row['subsystem'] += case.subsystem
         row['named'][case.first] = row['named'].get(case.first, 0) + 1
-        if case.shares.get('all') is not None:
+        if case.shares.get('all') is not None and case.world not in WITH_BASELINE:
             row['shares'].append(case.shares['all'])
     for row in result.values():
         row['median_share'] = float(np.median(row['shares'])) if row['shares'] else None

@@ -17,7 +17,7 @@ import sys
 import time
 from typing import Any
 
-from lg_husky_sim.errors import CommandError, LgHuskyError
+from lg_husky_sim.errors import CommandError, LgHuskyError, RecordingError
 from lg_husky_sim.proof import bags, measures, plain
 from lg_husky_sim.proof.cases import generate, NoTraceError, Spec
 from lg_husky_sim.proof.scoring import judge, Judgement
@@ -222,6 +222,13 @@ def diagnose(folders: Folders, name: str) -> dict[str, Any]:
 
 def _hold_out(folders: Folders, name: str, model: Path) -> tuple[list[Any], str]:
     """Return the errors on each held-out recording, and why there are none."""
+    try:
+        return _measured(folders, name, model)
+    except RecordingError as error:
+        return [], str(error)
+
+
+def _measured(folders: Folders, name: str, model: Path) -> tuple[list[Any], str]:
     train = [bags.read_bag(path)
              for path in sorted((folders.cases / name / 'recordings').iterdir())]
     parameters = plain.calibrate(train)

@@ -53,6 +53,17 @@ def test_the_best_rival_counts_as_second() -> None:
     assert not judge(answer('gyro_bias'), outcome('known', wrong)).top2
 
 
+def test_of_names_only_two_count_and_of_an_unknown_none() -> None:
+    rivals = [{'effect': 'slope', 'held_out_gain_nats': 90.0}]
+    wrong = finding('quadratic_drag', 'translation', rivals=rivals)
+    assert not judge(answer('slope'), outcome('known', wrong, finding(
+        'payload', 'translation'))).top2
+    assert judge(answer('slope'), outcome('known', wrong, finding('slope', 'translation'))).top2
+    nameless = judge(answer('slope'), outcome('unknown', finding(
+        'unknown', 'translation', rivals=rivals)))
+    assert (nameless.top1, nameless.top2, nameless.nearest) == (False, False, True)
+
+
 def test_a_declared_inseparable_pair_counts_as_second() -> None:
     said = finding('encoder_scale', 'sensor')
     truth = answer('wheel_radius_mismatch')
@@ -85,6 +96,22 @@ def test_a_crash_is_a_failure_and_never_right() -> None:
     one = judge(answer('slope'), {'diagnosis': None, 'error': 'error: no wheels', 'held_out': []})
     assert (one.first, one.failed, one.top2) == ('failed', 'error: no wheels', False)
     assert math.isnan(one.seconds)
+    assert one.shares == {'all': 0.0, 'position_m': 0.0}
+
+
+def test_a_model_that_cannot_be_driven_is_a_failure_too() -> None:
+    said = {**outcome('known', finding('slope', 'translation')), 'held_out_error': 'simulate: no'}
+    one = judge(answer('slope'), said)
+    assert (one.failed, one.top1, one.shares['all']) == ('simulate: no', True, 0.0)
+    (rate,) = [r for r in summary.rates([one]) if r.name.startswith('no diagnosis')]
+    assert (rate.hits, rate.reached) == (1, False)
+
+
+def test_a_crash_on_a_clean_robot_is_a_false_alarm() -> None:
+    crashed = judge(answer(kind='clean'), {'diagnosis': None, 'error': 'crashed', 'held_out': []})
+    fine = judge(answer(kind='clean'), outcome('nothing_missing'))
+    (rate,) = [r for r in summary.rates([crashed, fine]) if 'false alarm' in r.name]
+    assert (rate.hits, rate.count) == (1, 2)
 
 
 @pytest.mark.parametrize(('said', 'error'), [
@@ -130,6 +157,7 @@ def test_share_of_the_achievable() -> None:
     assert measures.share(2.0, 3.5, 0.5) == -1.0
     assert measures.share(1.0, 0.9, 0.95) is None
     assert measures.share(1.0, 0.9, math.nan) is None
+    assert measures.share(1.0, math.nan, 0.1) == measures.share(1.0, math.inf, 0.1) == -1.0
 
 
 def test_wilson_s_interval_has_its_published_values() -> None:
@@ -178,8 +206,8 @@ def test_the_summary_counts() -> None:
     rates = {rate['name']: rate for rate in result['rates']}
     assert rates['medium and strong: named right']['value'] == pytest.approx(2.0 / 3.0)
     assert rates['medium and strong: named right']['reached'] is False
-    assert rates['clean: named or called unknown (false alarm)']['value'] == 0.5
-    assert rates['clean: named or called unknown (false alarm)']['reached'] is False
+    assert rates['clean: named, called unknown or failed (false alarm)']['value'] == 0.5
+    assert rates['clean: named, called unknown or failed (false alarm)']['reached'] is False
     assert rates['pairs: at least one right']['reached'] is True
     assert rates['pairs: both right']['reached'] is False
     assert result['shares']['known effects, all'] == {
@@ -191,6 +219,22 @@ def test_the_summary_counts() -> None:
     assert row[table['named'].index('payload')] == 1
     assert sum(map(sum, table['counts'])) == 5
     assert result['by_effect']['slope']['named'] == {'slope': 2, 'payload': 1}
+
+
+def test_shares_against_a_baseline_stand_apart() -> None:
+    """They count what is known of the base, too: a clean robot has a share there."""
+    held = {who: {'all': value, 'position_m': value}
+            for who, value in (('plain', 2.0), ('augmented', 0.8), ('truth', 0.5))}
+    cases = []
+    for kind, effects in (('clean', ()), ('single', ('slope',))):
+        given = answer(*effects, kind=kind)
+        given['spec']['world'] = 'g3'
+        cases.append(judge(given, {**outcome('nothing_missing'), 'held_out': [held]}))
+    result = summary.summarise(cases)
+    assert result['shares']['known effects, all']['count'] == 0
+    assert result['shares']['against a baseline, all']['count'] == 1
+    assert result['shares']['against a baseline, clean, all']['median'] == pytest.approx(0.8)
+    assert result['by_effect']['slope']['median_share'] is None
 
 
 def test_text_and_page_say_the_figures() -> None:
