@@ -29,6 +29,9 @@ TOGETHER = 0.9
 WIDE = 0.3
 #: Least gain in relative accuracy of a ratio or product over its parts to be worth saying.
 GAIN = 3.0
+#: Share of the largest eigenvalue of the curvature below which a direction counts as untouched by
+#: the data: a million times less certain than the best one.
+FLAT = 1e-12
 _MECHANICAL = {'wheel_damping', 'yaw_damping', 'mass', 'yaw_inertia', 'wheel_inertia'}
 _MOTOR = {'torque_constant', 'motor_resistance', 'motor_inductance', 'gear_ratio'}
 _KINEMATIC = {'wheel_radius', 'track', 'turn_ratio'}
@@ -121,9 +124,10 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     unknowns = tuple(solution.unknowns[i] for i in layout.shared)
     size = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
     shape = curvature / np.outer(size, size)
-    eigenvalues = np.linalg.eigvalsh(shape) if count else np.ones(1)
+    eigenvalues, axes = np.linalg.eigh(shape) if count else (np.ones(1), np.ones((0, 1)))
     condition = float(eigenvalues[-1] / max(eigenvalues[0], 1e-16))
-    bread = np.linalg.pinv(shape, rcond=1e-14, hermitian=True) / np.outer(size, size)
+    # A direction that the data do not touch is open up to the bounds, and not known exactly.
+    bread = axes / np.maximum(eigenvalues, FLAT * eigenvalues[-1]) @ axes.T / np.outer(size, size)
     scores = _block_sums(problem, slope, white)
     blocks = scores.shape[0]
     meat = scores.T @ scores * blocks / max(blocks - 1, 1)

@@ -142,6 +142,21 @@ def test_an_effect_and_a_nuisance_are_estimated_with_the_rest(
     assert 'gyro_bias' not in result.model.parameters
 
 
+def test_what_nothing_measures_is_open_up_to_its_bounds(husky: ModelFile, circle: Segment,
+                                                        truth: Truth) -> None:
+    """Without a gyro, its bias and delay are not zero with certainty."""
+    mute = replace(circle, streams={
+        name: series for name, series in circle.streams.items() if name != 'imu'})
+    result = estimate(husky, [mute], nuisance=['gyro_bias', 'delay_imu'], starts=1)
+    known = {one.name: one for one in result.estimates}
+    for name in ('gyro_bias', 'delay_imu'):
+        assert known[name].low < -0.04 < 0.04 < known[name].high
+        assert f'{name} is hardly determined' in ' '.join(result.undetermined)
+    for name, value in truth.items():
+        assert known[name].low < value < known[name].high
+        assert known[name].high < 1.2 * known[name].low
+
+
 def test_a_bound_that_was_hit_is_warned_of(husky: ModelFile, circle: Segment) -> None:
     entry = husky.parameters.entry('command_gain')
     narrow = ModelFile(husky.structure, husky.parameters.with_entries(
