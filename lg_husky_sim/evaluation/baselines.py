@@ -199,7 +199,9 @@ def fit_kinematics(data: Observations, parameters: Parameters) -> Kinematics:
         mirrored = np.vstack([inputs[0] * np.array([1.0, -1.0]), inputs[1]])
         gains, _ = _robust_gains(mirrored, np.concatenate(values))
         if gains[0] > 0.0:
-            radius, arm = 1.0 / float(gains[0]), float(gains[1] / gains[0])
+            radius = 1.0 / float(gains[0])
+            # A drive without turns does not show the arm.
+            arm = radius * float(gains[1]) if gains[1] > 0.0 else arm
     name = 'yaw_rate' if 'yaw_rate' in data.channels else 'turn'
     track = 2.0 * arm
     if name in data.channels:

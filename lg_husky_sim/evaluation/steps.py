@@ -98,6 +98,8 @@ def within(data: Observations, steps: Sequence[Step]) -> Observations:
     """
     Return the values that lie in some of the steps; increments by the end of their window.
 
+    A channel of which less than a handful is left in a piece is left out there.
+
     Parameters
     ----------
     data : Observations
@@ -107,7 +109,7 @@ def within(data: Observations, steps: Sequence[Step]) -> Observations:
     for number, piece in enumerate(data.pieces):
         own = [step for step in steps if step.piece == number]
         channels = tuple(_picked(channel, own) for channel in piece.channels)
-        pieces.append(replace(piece, channels=tuple(c for c in channels if c.values.size)))
+        pieces.append(replace(piece, channels=tuple(c for c in channels if c.values.size > 3)))
     return Observations(tuple(pieces))
 
 

@@ -16,7 +16,7 @@ from lg_husky_sim.evaluation.baselines import (
     lag_predictor,
 )
 from lg_husky_sim.evaluation.real import evaluate_steps, LABELS, steps_data, steps_table
-from lg_husky_sim.evaluation.steps import halves, steps_of
+from lg_husky_sim.evaluation.steps import halves, steps_of, within
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.identification.options import with_effects
@@ -30,12 +30,14 @@ import pytest
 START_NS = 1_700_000_000_000_000_000
 
 
-def recording(effects: tuple[str, ...] = (), steps: int = 10, **values: float) -> Recording:
+def recording(effects: tuple[str, ...] = (), steps: int = 10, turning: float = 0.9,
+              **values: float) -> Recording:
     """Return a robot driven by random constant steps of 4 s, encoders at 7 Hz."""
     model = with_effects(load_model(), effects)
     plant = compile_model(model.structure).at(model.parameters.replacing(values))
     draws = np.random.default_rng(4)
-    targets = np.column_stack([draws.uniform(-0.6, 0.6, steps), draws.uniform(-0.9, 0.9, steps)])
+    targets = np.column_stack([draws.uniform(-0.6, 0.6, steps),
+                               draws.uniform(-turning, turning, steps)])
     times = 0.05 * np.arange(80 * steps + 1, dtype=np.float64)
     commands = TimeSeries(times, targets[np.minimum((times / 4.0).astype(int), steps - 1)],
                           ('forward', 'yaw'))
@@ -108,6 +110,23 @@ def test_the_kinematic_model_finds_the_effective_track(data: Observations) -> No
     mask = data.channel_mask('turn')
     rest = np.sqrt(np.mean((data.measured - predicted)[mask] ** 2))
     assert rest < 0.5 * np.sqrt(np.mean(data.measured[mask] ** 2))
+
+
+def test_a_drive_without_turns_keeps_the_nominal_track() -> None:
+    nominal = load_model().parameters
+    straight = observations(segments(recording(steps=4, turning=0.0)))
+    model = fit_kinematics(straight, nominal)
+    assert model.arm == 0.5 * nominal['track']
+    assert model.track > 0.0
+    assert np.all(np.isfinite(kinematic_predictor(model)(straight)))
+
+
+def test_a_handful_of_values_is_no_channel(data: Observations) -> None:
+    """Of the encoders, that send seven times a second, a short step holds too few."""
+    (piece,) = within(data, [replace(steps_of(data)[1], end=4.4)]).pieces
+    assert {channel.name for channel in piece.channels} == set()
+    (piece,) = within(data, [replace(steps_of(data)[1], end=4.8)]).pieces
+    assert 'wheel_left' in {channel.name for channel in piece.channels}
 
 
 def test_what_the_base_does_is_found_on_held_out_steps() -> None:
