@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -71,7 +72,8 @@ def command(
                                            disable=None, leave=False)):
         rival = None
         if rivals:
-            rival = (_rival_label(rivals, place), read_recording(rivals[place]))
+            rival = (_rival_label(rivals, place, [named.label for named in plants]),
+                     read_recording(rivals[place]))
         outcomes.append(compare_recording(
             recording, plants_in(plants, recording.name, names), rival, horizon))
     total = sum(1 for outcome in outcomes for _ in pictured(outcome, most))
@@ -82,6 +84,8 @@ def command(
     click.echo(f'{out / "index.html"}: pictures of {total} segment{"s" if total != 1 else ""}')
 
 
-def _rival_label(rivals: tuple[str, ...], place: int) -> str:
-    """Return the name of a rival: one name for all, so that they are pooled."""
-    return 'rival' if len(rivals) > 1 else Path(rivals[place]).stem
+def _rival_label(rivals: tuple[str, ...], place: int, taken: Sequence[str]) -> str:
+    """Return the name of a rival: one name for all, so that they are pooled, and no model's."""
+    from lg_husky_sim.recording.names import printable
+    label = printable('rival' if len(rivals) > 1 else Path(rivals[place]).stem)
+    return f'{label} (rival)' if label in taken else label

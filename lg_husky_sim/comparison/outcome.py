@@ -19,7 +19,7 @@ from lg_husky_sim.comparison.metrics import (
 from lg_husky_sim.comparison.models import NamedPlant
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.rival import rival_prediction
-from lg_husky_sim.errors import CommandError
+from lg_husky_sim.errors import CommandError, RecordingError
 from lg_husky_sim.recording import Recording, Segment, segments, windows
 from lg_husky_sim.recording.names import printable
 from lg_husky_sim.signals import TimeSeries
@@ -95,7 +95,7 @@ def compare_recording(
     Raises
     ------
     RecordingError
-        If it has no commands.
+        If it has no commands, or the rival recorded nothing in any of its segments.
     CommandError
         If it has no segment to compare.
     """
@@ -108,17 +108,31 @@ def compare_recording(
             f'recording {recording.name} has nothing to compare: its streams '
             f'({", ".join(recording.streams)}) must be commands and wheels, imu or pose, and '
             'overlap without a gap')
+    beside: list[dict[str, TimeSeries]] = [{} for _ in parts] if rival is None else _beside(
+        parts, recording, *rival)
     return RecordingOutcome(recording, tuple(
-        _segment(part, plants, recording, rival) for part in parts))
+        _segment(part, plants, own) for part, own in zip(parts, beside, strict=True)))
 
 
-def _segment(
-    part: Segment, plants: Sequence[NamedPlant], recording: Recording,
-    rival: tuple[str, Recording] | None,
-) -> SegmentOutcome:
-    predictions = {named.label: replay(named.plant, part) for named in plants}
-    if rival is not None:
-        predictions[rival[0]] = rival_prediction(rival[1], recording, part)
+def _beside(parts: Sequence[Segment], recording: Recording, label: str, rival: Recording
+            ) -> list[dict[str, TimeSeries]]:
+    # The rival in each segment; in none of those in which it recorded nothing, but in some.
+    found: list[dict[str, TimeSeries]] = []
+    failure: RecordingError | None = None
+    for part in parts:
+        try:
+            found.append({label: rival_prediction(rival, recording, part)})
+        except RecordingError as error:
+            found.append({})
+            failure = error
+    if failure is not None and not any(found):
+        raise failure
+    return found
+
+
+def _segment(part: Segment, plants: Sequence[NamedPlant], beside: Mapping[str, TimeSeries]
+             ) -> SegmentOutcome:
+    predictions = {**{named.label: replay(named.plant, part) for named in plants}, **beside}
     errors = {label: channel_errors(part, series) for label, series in predictions.items()}
     tracks = {label: tracking(part, series) for label, series in predictions.items()
               if 'pose' in part.streams and np.any(np.isfinite(series.column('x')))}

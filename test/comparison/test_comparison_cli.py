@@ -220,6 +220,18 @@ def test_compare_needs_commands_and_a_measurement(bag: Path, capsys: Any) -> Non
         assert message in _message(capsys)
 
 
+def test_a_rival_may_end_early_and_be_called_like_a_model(bag: Path) -> None:
+    whole = read_recording(bag)
+    rival = write_recording(bag.parent / 'paper', {
+        name: series.slice(0.0, 1.6) for name, series in whole.streams.items()},
+        start_ns=whole.start_ns)
+    assert run(['compare', str(bag), '--horizon', '1', '--rival', str(rival),
+                '--out', str(bag.parent / 'result')]) == 0
+    data = json.loads((bag.parent / 'result' / 'compare.json').read_text())
+    assert [list(part['results']) for part in data['recordings'][0]['segments']] == [
+        ['paper', 'paper (rival)'], ['paper', 'paper (rival)'], ['paper']]
+
+
 @pytest.mark.parametrize('kept', [('wheels',), ('pose',), ('imu',)])
 def test_compare_with_one_measured_stream(kept: tuple[str, ...], bag: Path) -> None:
     streams = read_recording(bag).streams
