@@ -15,7 +15,7 @@ from lg_husky_sim.evaluation.cases import Case
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.identification.estimate import estimate
+from lg_husky_sim.identification.estimate import estimate, STARTS
 from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.identification.result import FitResult, Method
 from lg_husky_sim.recording import Recording, Segment, segments
@@ -81,7 +81,7 @@ class CaseResult:
         return tuple(self.drives[0].tracks)
 
 
-def evaluate_case(case: Case, model: ModelFile, seed: int,
+def evaluate_case(case: Case, model: ModelFile, seed: int, starts: int = STARTS, jobs: int = 1,
                   tell: Callable[[str], None] | None = None) -> CaseResult:
     """
     Calibrate on the first manoeuvre and predict all of them.
@@ -92,6 +92,10 @@ def evaluate_case(case: Case, model: ModelFile, seed: int,
     model : ModelFile
         To start from.
     seed : int
+    starts : int
+        Of each least-squares estimation.
+    jobs : int
+        Processes to use.
     tell : callable, optional
 
     Returns
@@ -105,10 +109,12 @@ def evaluate_case(case: Case, model: ModelFile, seed: int,
     """
     names = list(case.recordings)
     parts = {name: _longest(case.recordings[name]) for name in names}
-    fits = {label: estimate(model, [parts[names[0]]], method=method, seed=seed, progress=tell)
+    fits = {label: estimate(model, [parts[names[0]]], method=method, seed=seed, starts=starts,
+                            jobs=jobs, progress=tell)
             for label, method in ((GENETIC, Method.GENETIC), (SQUARES, Method.LEAST_SQUARES))}
     extended = with_effects(model, BASE_EFFECTS)
-    fits[BASE] = estimate(extended, [parts[names[0]]], baseline=model, seed=seed, progress=tell)
+    fits[BASE] = estimate(extended, [parts[names[0]]], baseline=model, seed=seed, starts=starts,
+                          jobs=jobs, progress=tell)
     plants = {label: compile_model(fit.model.structure).at(fit.model.parameters)
               for label, fit in fits.items()}
     plants[NOMINAL] = compile_model(model.structure).at(model.parameters)

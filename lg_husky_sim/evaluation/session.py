@@ -23,7 +23,7 @@ from lg_husky_sim.evaluation.real import (
 from lg_husky_sim.folders import result_folder
 from lg_husky_sim.husky.model_file import ModelFile, save_model
 from lg_husky_sim.identification.pages import page, Section
-from lg_husky_sim.recording import read_recording, TopicMap
+from lg_husky_sim.recording import named_apart, read_recording, TopicMap
 
 MARKER = 'evaluation.json'
 SCHEMA = 'lg_husky_sim/evaluation/1'
@@ -83,10 +83,11 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None]) -> 
     str
         The tables as text.
     """
-    results = [evaluate_case(case, request.model, request.seed, tell)
-               for case in _cases(request)]
-    steps = [evaluate_steps(read_recording(path, request.topics), request.model, request.seed,
-                            request.starts, request.jobs, tell=tell) for path in request.steps]
+    results = [evaluate_case(case, request.model, request.seed, request.starts, request.jobs,
+                             tell) for case in _cases(request)]
+    read, = named_apart([read_recording(path, request.topics) for path in request.steps])
+    steps = [evaluate_steps(recording, request.model, request.seed, request.starts, request.jobs,
+                            tell=tell) for recording in read]
     texts, sections = [], []
     data: dict[str, Any] = {'schema': SCHEMA, 'seed': request.seed,
                             'cases': [case_report.data(result) for result in results],
@@ -102,8 +103,8 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None]) -> 
             texts.append(case_report.text(result))
             sections.append(case_report.section(result, pictures))
         for result_of_steps in steps:
-            save_model(result_of_steps.extended.model,
-                       folder / f'{result_of_steps.recording}.yaml')
+            name = result_of_steps.recording.strip('/').replace('/', '_')
+            save_model(result_of_steps.extended.model, folder / f'{name}.yaml')
             texts.append(steps_text(result_of_steps))
             sections.append(_steps_section(result_of_steps))
         text = '\n\n\n'.join(texts)

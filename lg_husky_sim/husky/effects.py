@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import difflib
 import enum
@@ -68,6 +68,12 @@ class Onset:
     def recordings(self) -> tuple[str, ...]:
         """Names of the recordings that it tells apart."""
         return (*self.earlier, self.recording) if self.recording else self.earlier
+
+    def before(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Return the recordings before its own: in the order of `names`, or known to be so."""
+        if self.recording not in names:
+            return self.earlier
+        return (*names[:names.index(self.recording)], *self.earlier)
 
 
 @dataclass(frozen=True)

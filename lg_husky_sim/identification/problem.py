@@ -203,10 +203,12 @@ class Observations:
 
     def _regime(self, plant: Plant, recording: str) -> int:
         # 0 in or without the onset's recording, -1 before it, 1 after it; a place stays a place.
-        if plant.onset is None or plant.onset.recording not in self.recordings:
+        onset = plant.onset
+        if onset is None or onset.recording in ('', recording):
             return 0
-        own, other = (self.recordings.index(n) for n in (recording, plant.onset.recording))
-        return -1 if own < other else int(own > other and plant.onset.kind.value == 'time')
+        if recording in onset.before(self.recordings):
+            return -1
+        return int(onset.kind.value == 'time')
 
     @cached_property
     def recordings(self) -> tuple[str, ...]:
@@ -215,10 +217,9 @@ class Observations:
 
     def plant_in(self, plant: Plant, recording: str) -> Plant:
         """Return a plant as it is in one of the recordings."""
-        if plant.onset is None or plant.onset.recording not in self.recordings:
-            return plant
-        names = self.recordings
-        return plant.in_recording(recording, names[:names.index(plant.onset.recording)])
+        onset = plant.onset
+        return plant if onset is None else plant.in_recording(
+            recording, onset.before(self.recordings))
 
     def read_as(self, momentary: bool) -> Observations:
         """Return the observations with wheel rates of the moment, or as means over a while."""

@@ -14,7 +14,14 @@ from lg_husky_sim.identification.estimate import estimate, STARTS
 from lg_husky_sim.identification.executor import run_tasks
 from lg_husky_sim.identification.report import write_fit
 from lg_husky_sim.identification.result import FitResult, Method
-from lg_husky_sim.recording import named_apart, read_recording, Segment, segments, TopicMap
+from lg_husky_sim.recording import (
+    named_apart,
+    named_as_in,
+    read_recording,
+    Segment,
+    segments,
+    TopicMap,
+)
 
 
 @dataclass(frozen=True)
@@ -45,16 +52,18 @@ class Request:
     topics: TopicMap | None = None
 
 
-def read_segments(paths: Sequence[str], topics: TopicMap | None = None) -> list[Segment]:
+def read_segments(request: Request, paths: Sequence[str]) -> list[Segment]:
     """
-    Return the segments of several recordings.
+    Return the segments of several recordings, under the names by which the model knows them.
 
     Raises
     ------
     RecordingError
         If a recording cannot be read or is given twice.
     """
-    read, = named_apart([read_recording(path, topics) for path in paths])
+    onset = request.model.structure.onset
+    read, = named_apart(named_as_in([read_recording(path, request.topics) for path in paths],
+                                    () if onset is None else onset.recordings))
     return [segment for recording in read for segment in segments(recording)]
 
 
@@ -88,7 +97,7 @@ def fit_together(request: Request, paths: Sequence[str], out: Path, jobs: int = 
     tuple of pathlib.Path
         The files.
     """
-    parts = read_segments(paths, request.topics)
+    parts = read_segments(request, paths)
     result = _fit(request, parts, jobs, scheduler, tell)
     return result, write_fit(result, parts, request.before, out)
 
@@ -100,7 +109,7 @@ class _Task:
 
 
 def _fit_one(task: _Task) -> FitResult:
-    parts = read_segments([task.path], task.request.topics)
+    parts = read_segments(task.request, [task.path])
     return _fit(task.request, parts, 1, None, None)
 
 
@@ -139,8 +148,7 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
     results = run_tasks(_fit_one, [_Task(request, path) for path in paths], jobs, scheduler,
                         lambda: word('recording'))
     for name, path, result in zip(names, paths, results, strict=True):
-        write_fit(result, read_segments([path], request.topics), request.before,
-                  out / f'{name}.yaml')
+        write_fit(result, read_segments(request, [path]), request.before, out / f'{name}.yaml')
     return each_table(names, results)
 
 

@@ -51,6 +51,9 @@ class Track:
         Where within the step.
     targets : numpy.ndarray, shape (n_samples, 2)
         Measured x and y [m].
+    recording : str
+    recordings : tuple of str
+        All that are fitted, in their order: some effects begin between them.
     """
 
     name: str
@@ -62,6 +65,8 @@ class Track:
     steps: np.typing.NDArray[np.int64]
     shares: FloatArray
     targets: FloatArray
+    recording: str = ''
+    recordings: tuple[str, ...] = ()
 
     @property
     def times(self) -> FloatArray:
@@ -77,6 +82,8 @@ class Track:
         ----------
         plant : Plant
         """
+        if plant.onset is not None:
+            plant = plant.in_recording(self.recording, plant.onset.before(self.recordings))
         simulator = Simulator(plant, PERIOD, fine_pose=False)
         state = simulator.initial(self.pose, self.twist, self.start, self.wheel_rates)
         _, out = simulator.run(state, self.commands)
@@ -86,13 +93,15 @@ class Track:
         return there
 
 
-def track_of(segment: Segment) -> Track | None:
+def track_of(segment: Segment, recordings: Sequence[str] = ()) -> Track | None:
     """
     Prepare a segment.
 
     Parameters
     ----------
     segment : Segment
+    recordings : sequence of str
+        Names of all that are fitted, in their order.
 
     Returns
     -------
@@ -126,7 +135,8 @@ def track_of(segment: Segment) -> Track | None:
     steps = np.clip(np.ceil(place - 1e-9).astype(np.int64) - 1, 0, count - 1)
     return Track(f'{segment.recording}[{segment.index}]', start,
                  hold(commands, start, PERIOD, count), first, twist, rates, steps,
-                 place - steps, np.ascontiguousarray(pose.values[:, :2]))
+                 place - steps, np.ascontiguousarray(pose.values[:, :2]), segment.recording,
+                 tuple(recordings))
 
 
 class TrackingObjective:
@@ -150,7 +160,9 @@ class TrackingObjective:
 
     def __init__(self, model: HuskyModel, parameters: Parameters, free: tuple[str, ...],
                  segments: Sequence[Segment]) -> None:
-        self.tracks = tuple(t for t in map(track_of, segments) if t is not None)
+        names = tuple(dict.fromkeys(segment.recording for segment in segments))
+        tracks = (track_of(segment, names) for segment in segments)
+        self.tracks = tuple(track for track in tracks if track is not None)
         if not self.tracks:
             raise FitError('the objective of eq. (23) needs a pose and a command; no segment '
                            'has both')

@@ -7,12 +7,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lg_husky_sim.errors import FitError
-from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification import lanes
 from lg_husky_sim.identification.halves import can_split, HalvesMaker
 from lg_husky_sim.identification.options import with_effects
+from lg_husky_sim.identification.problem import observations
 from lg_husky_sim.identification.tracking import PERIOD, track_of, TrackingObjective
 from lg_husky_sim.jit import SWITCH
 from lg_husky_sim.recording import Segment
@@ -119,3 +120,30 @@ def test_a_drive_without_pose_has_no_objective(husky: ModelFile, circle: Segment
     blind = replace(circle, streams={k: v for k, v in circle.streams.items() if k != 'pose'})
     with pytest.raises(FitError, match='needs a pose'):
         TrackingObjective(compile_model(husky.structure), husky.parameters, FREE, [blind])
+
+
+def test_an_effect_begins_between_recordings(husky: ModelFile, circle: Segment) -> None:
+    """However few of them are given, in the objective of the paper and in least squares."""
+    effect = Effect('rolling_resistance', late=True)
+    parameters = husky.parameters.with_entries(*(
+        entry.parameter(60.0 if entry.name == 'rolling_force' else None)
+        for entry in effect.parameters()))
+    late = compile_model(Structure().with_effect(
+        effect, Onset(OnsetKind.TIME, 5.0, 'two', ('one',)))).at(parameters)
+    never, always = (compile_model(structure).at(parameters) for structure in (
+        Structure(), Structure().with_effect(replace(effect, late=False))))
+    for name, same, other in (('one', never, always), ('three', always, never)):
+        part = replace(circle, recording=name)
+        track, data = track_of(part), observations([part])
+        assert track is not None
+        for predict in (track.simulate, data.predict):
+            np.testing.assert_array_equal(predict(late), predict(same))
+            assert not np.allclose(predict(late), predict(other))
+    # In its own recording from then on, and before it in what stands before it.
+    parts = [replace(circle, recording=name) for name in ('zero', 'two')]
+    tracks = TrackingObjective(compile_model(husky.structure), husky.parameters, (), parts).tracks
+    np.testing.assert_array_equal(tracks[0].simulate(late), tracks[0].simulate(never))
+    own, early = tracks[1].simulate(late), tracks[1].times < 5.0
+    np.testing.assert_allclose(own[early], tracks[1].simulate(never)[early], atol=1e-6)
+    assert not np.allclose(own, tracks[1].simulate(never))
+    assert not np.allclose(own, tracks[1].simulate(always))
