@@ -121,8 +121,21 @@ def replay(
     at = start or initial_state(segment, plant)
     end = segment.end + period  # the last sample lies inside the grid
     truth = rollout(plant, segment.streams['command'], end, period, segment.start, at.pose,
-                    at.twist, at.wheel_rates, at.wheel_angles)
+                    at.twist, at.wheel_rates, at.wheel_angles, _commanded(segment, at, plant))
     return plant.observe(truth)
+
+
+def _commanded(segment: Segment, at: InitialState, plant: Plant) -> BodyTwist | None:
+    """Return what a robot that starts in motion follows: the command that is in force then."""
+    moving = any((*(at.wheel_rates or ()), at.twist.forward, at.twist.yaw))
+    commands = segment.streams['command']
+    if not moving or commands.times[0] > segment.start + PERIOD:
+        return None
+    place = max(int(np.searchsorted(commands.times, segment.start, side='right')) - 1, 0)
+    stage = plant.sets[0].command
+    forward, yaw = (float(np.clip(value, -limit, limit)) for value, limit in zip(
+        commands.values[place], (stage.limit_forward, stage.limit_yaw), strict=True))
+    return BodyTwist(forward, yaw)
 
 
 def _rest(segment: Segment) -> float:

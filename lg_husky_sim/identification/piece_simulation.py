@@ -9,7 +9,7 @@ from functools import lru_cache
 from lg_husky_sim.husky.plant import SensorModel
 from lg_husky_sim.identification.pieces import PERIOD, Piece
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
-from lg_husky_sim.simulation.kernel import COLUMNS, DELAY, run
+from lg_husky_sim.simulation.kernel import COLUMNS, run
 from lg_husky_sim.simulation.simulator import hold, Simulator
 import numpy as np
 
@@ -52,10 +52,11 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
     stride = max(1, round(RESET / PERIOD)) if known else piece.count or 1
     poses = _poses(piece, stride)
     angles = _angles(piece, stride, simulator.plant.sets[0].sensors)
-    state = simulator.initial(poses[0], twist, piece.start, rates, piece.wheel_angles)
+    # What was commanded before a piece is taken to be its first command.
+    before = BodyTwist(*held[0].tolist()) if (
+        len(commands) and commands.times[0] <= piece.start + PERIOD) else None
+    state = simulator.initial(poses[0], twist, piece.start, rates, piece.wheel_angles, before)
     flat = np.array(state.flat)
-    if len(commands) and commands.times[0] <= piece.start + PERIOD:
-        _fill_command(flat, state.n, held)
     out = np.empty((piece.count + 1, len(COLUMNS)))
     out[0] = state.row
     ahead = np.zeros(2)
@@ -82,14 +83,6 @@ def _held(piece: Piece, latency: float) -> FloatArray:
     if latency:
         commands = TimeSeries(commands.times + latency, commands.values, commands.names)
     return hold(commands, piece.start, PERIOD, piece.count)
-
-
-def _fill_command(flat: FloatArray, n: int, held: FloatArray) -> None:
-    # What was commanded before a segment is taken to be its first command.
-    base = n + 11
-    flat[base:base + 2] = held[0]
-    flat[base + 3:base + 3 + DELAY] = held[0, 0]
-    flat[base + 3 + DELAY:] = held[0, 1]
 
 
 def _angles(piece: Piece, stride: int, sensors: SensorModel) -> FloatArray | None:

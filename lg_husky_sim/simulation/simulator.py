@@ -112,7 +112,8 @@ class Simulator:
 
     def initial(self, pose: Pose | None = None, twist: BodyTwist | None = None,
                 time: float = 0.0, wheel_rates: tuple[float, float] | None = None,
-                wheel_angles: tuple[float, float] = (0.0, 0.0)) -> SimulatorState:
+                wheel_angles: tuple[float, float] = (0.0, 0.0),
+                command: BodyTwist | None = None) -> SimulatorState:
         """
         Return a state to start from.
 
@@ -127,6 +128,9 @@ class Simulator:
             Left and right [rad/s]; those that roll without slip at ``twist`` if not given.
         wheel_angles : tuple of float
             Left and right [rad].
+        command : BodyTwist, optional
+            What has been commanded until then, which a base with dead time or limits of the
+            acceleration still follows; nothing if not given.
 
         Returns
         -------
@@ -149,6 +153,11 @@ class Simulator:
                 one.rows[:4], wanted - one.rows[:4] @ nearest, rcond=None)[0]
         flat[n:n + 2] = wheel_angles
         flat[n + 3:n + 7] = pose.heading, pose.x, pose.y, time
+        if command is not None:
+            stage = n + 11
+            flat[stage:stage + 2] = command.forward, command.yaw
+            flat[stage + 3:stage + 3 + DELAY] = command.forward
+            flat[stage + 3 + DELAY:] = command.yaw
         row = np.zeros(len(COLUMNS))
         row[:4] = wanted
         row[7:13] = *wheel_angles, 0.0, pose.heading, pose.x, pose.y
@@ -290,7 +299,8 @@ def hold(commands: TimeSeries, start: float, period: float, count: int) -> Float
 def rollout(plant: Plant, commands: TimeSeries, end: float, period: float = 0.02,
             start: float | None = None, pose: Pose | None = None,
             twist: BodyTwist | None = None, wheel_rates: tuple[float, float] | None = None,
-            wheel_angles: tuple[float, float] = (0.0, 0.0)) -> TimeSeries:
+            wheel_angles: tuple[float, float] = (0.0, 0.0),
+            command: BodyTwist | None = None) -> TimeSeries:
     """
     Drive a plant with recorded commands.
 
@@ -305,7 +315,7 @@ def rollout(plant: Plant, commands: TimeSeries, end: float, period: float = 0.02
         Step [s].
     start : float, optional
         First time [s]; the first command's stamp if not given.
-    pose, twist, wheel_rates, wheel_angles
+    pose, twist, wheel_rates, wheel_angles, command
         Where to start, as in :meth:`Simulator.initial`.
 
     Returns
@@ -321,7 +331,7 @@ def rollout(plant: Plant, commands: TimeSeries, end: float, period: float = 0.02
     simulator = Simulator(plant, period)
     first = float(commands.times[0]) if start is None else start
     count = max(0, math.floor((end - first) / period + 1e-9))
-    state = simulator.initial(pose, twist, first, wheel_rates, wheel_angles)
+    state = simulator.initial(pose, twist, first, wheel_rates, wheel_angles, command)
     _, out = simulator.run(state, hold(commands, first, period, count))
     times: FloatArray = first + period * np.arange(count + 1, dtype=np.float64)
     return TimeSeries(times, np.vstack([state.row, out]), COLUMNS)

@@ -12,9 +12,11 @@ from lg_husky_sim.comparison import channel_errors, initial_state, replay, track
 from lg_husky_sim.comparison.models import load_plants, NamedPlant, plants_in, unique_labels
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model, Structure
+from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.recording import Recording, Segment, segments
 from lg_husky_sim.recording.recording import cut
 from lg_husky_sim.signals import TimeSeries
+from lg_husky_sim.simulation import rollout
 import numpy as np
 import pytest
 
@@ -46,6 +48,28 @@ def test_a_replay_from_the_midst_of_a_drive(
     assert errors['wheel_speed'].rmse < 0.05
     assert errors['yaw_rate'].rmse < 0.01
     assert errors['position'].rmse < 0.03
+
+
+@pytest.mark.parametrize('effects', [
+    ('command_latency', 'command_slew'), ('command_slew', 'command_limit')])
+def test_a_base_that_starts_in_motion_follows_what_was_commanded(
+    effects: tuple[str, ...], paper: NamedPlant,
+) -> None:
+    """Dead time and limits do not begin with an empty line of commands: it would brake."""
+    model = with_effects(paper.model, effects)
+    plant = compile_model(model.structure).at(model.parameters.replacing({
+        'latency': 0.2} if 'latency' in model.parameters else {'limit_yaw': 0.2}))
+    times = 0.1 * np.arange(121.0)
+    commands = TimeSeries(times, np.column_stack(
+        [0.6 + 0.0 * times, np.where(times < 10.0, 0.5, -0.5)]), ('forward', 'yaw'))
+    seen = plant.observe(rollout(plant, commands, 12.0, 0.02))
+    recording = Recording('base', 'base', {'command': commands, 'wheels': TimeSeries(
+        seen.times, np.column_stack([seen.column('wheel_left'), seen.column('wheel_right')]),
+        ('left', 'right'))}, 0)
+    whole = replay(plant, segments(recording)[0])
+    late = replay(plant, _late(recording, 8.0, 'command', 'wheels'))
+    for name in ('wheel_left', 'wheel_right'):
+        np.testing.assert_allclose(late.column(name), whole.column(name)[-len(late):], atol=0.02)
 
 
 def test_the_initial_state_in_motion(
