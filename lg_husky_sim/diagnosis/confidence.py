@@ -17,6 +17,8 @@ from scipy.special import chdtrc
 
 #: Half width of a 95 % interval in standard deviations.
 TWO_SIDED = 1.96
+#: Share of the largest eigenvalue of the scaled information below which nothing is known.
+FLAT = 1e-10
 
 
 def covariance(observations: Observations, fit: Fit, metric: Metric) -> FloatArray:
@@ -43,7 +45,9 @@ def covariance(observations: Observations, fit: Fit, metric: Metric) -> FloatArr
     deviations = np.array([u.deviation for u in solution.unknowns])
     information = slope.T @ slope / level + np.diag(1.0 / deviations ** 2)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-12))
-    inside = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-10)
+    eigenvalues, axes = np.linalg.eigh(information * np.outer(scale, scale))
+    # A direction that the data do not touch is open up to the bounds, and not known exactly.
+    inside = axes / np.maximum(eigenvalues, FLAT * eigenvalues[-1]) @ axes.T
     result: FloatArray = inside * np.outer(scale, scale)
     return result
 

@@ -172,9 +172,10 @@ def _drivetrain(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         return network
     if effect.id == 'viscous_asymmetry':
         if effect.shape == 'slip':
+            # Whatever changed these tyres before, such as the ground, goes on.
             return network.with_values({
-                f'B_{wheel}': 'wheel_damping*(1+damping_change)'
-                for wheel in _WHEELS[effect.side]})
+                f'B_{wheel}': f'({branch_of(network.graph, f"B_{wheel}").value})'
+                              '*(1+damping_change)' for wheel in _WHEELS[effect.side]})
         letter, inertia = _axles(network, effect.side)[0]
         bearing = Branch(f'B_bearing_{letter}', Kind.D_TYPE, inertia.domain, inertia.tail,
                          inertia.head, 'extra_damping')

@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from lg_husky_sim.diagnosis.candidates import candidates, effect_entries, still_open
-from lg_husky_sim.diagnosis.fits import recalibrate, shared_metric
+from lg_husky_sim.diagnosis.confidence import estimates
+from lg_husky_sim.diagnosis.fits import fit_structure, recalibrate, shared_metric
 from lg_husky_sim.diagnosis.refits import look, Looked
 from lg_husky_sim.diagnosis.rounds import screen
 from lg_husky_sim.husky.effects import Effect
@@ -41,3 +42,19 @@ def test_no_candidate_shares_a_number_with_what_is_in() -> None:
     left = still_open(candidates(), structure)
     assert {c.effect.id for c in candidates()} - {c.effect.id for c in left} == {
         'coulomb_drivetrain', 'gyro_scale', 'gyro_sign'}
+
+
+def test_a_limit_that_nothing_reaches_is_open_and_not_exact(
+        record: Callable[..., Recording], steps: Sequence[tuple[float, float, float]]) -> None:
+    model, limit = load_model(), Effect('command_limit', shape='yaw')
+    data = observations(segments(record('rec', compile_model(model.structure).at(
+        model.parameters), steps, 1)))
+    base = recalibrate(data, model.structure, model.parameters)
+    used = shared_metric(data, base, [])
+    fit = fit_structure(data, model.structure.with_effect(limit), model.parameters, used,
+                        base.solution.values, {'limit_yaw': 5.0}, 0)
+    assert fit is not None
+    reach, damping = estimates(data, fit, used, ['limit_yaw', 'yaw_damping'])
+    (bounds,) = limit.parameters()
+    assert (reach.low, reach.high) == (bounds.lower, bounds.upper)
+    assert damping.low < damping.value < damping.high < 1.2 * damping.low

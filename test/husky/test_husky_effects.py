@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import math
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import catalogue, descriptions, Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, Pose, TimeSeries
@@ -251,6 +252,26 @@ def test_what_holds_one_side_back_turns_the_robot_to_it(robot: Maker, effect: st
     assert left == pytest.approx(-right, rel=1e-6)
     back = last(robot(Effect(effect, 'left', shape), **values), (-0.6, 0.0), 'yaw_rate')
     assert back == pytest.approx(-left, rel=1e-6)
+
+
+@pytest.mark.parametrize('other', [
+    (Effect('terrain_change'), {'wheel_damping_change': 0.8}),
+    (Effect('payload', shape='ground'), {'payload_mass': 30.0})])
+def test_a_stiffer_side_stays_so_on_other_ground(
+        other: tuple[Effect, Mapping[str, float]]) -> None:
+    """Factors on the same tyres multiply, whichever was found first."""
+    nominal = load_model()
+    mine = (Effect('viscous_asymmetry', 'left', 'slip'), {'damping_change': -0.4})
+    matrices = []
+    for order in ((mine, other), (other, mine)):
+        structure, values = nominal.structure, dict[str, float]()
+        for effect, sizes in order:
+            structure = structure.with_effect(effect)
+            values.update({p.name: p.starts[0] for p in effect.parameters()} | dict(sizes))
+        parameters = nominal.parameters.with_entries(*(
+            p.parameter(values[p.name]) for e in structure.effects for p in e.parameters()))
+        matrices.append(compile_model(structure).at(parameters).sets[0].a)
+    np.testing.assert_allclose(matrices[0], matrices[1], rtol=1e-12)
 
 
 def test_pull_slope_and_payload(robot: Maker) -> None:
