@@ -42,10 +42,36 @@ def _unique_mapping(loader: Any, node: yaml.MappingNode) -> dict[Hashable, Any]:
 
 
 _Loader.add_constructor('tag:yaml.org,2002:map', _unique_mapping)
+
+
+class _Dumper(yaml.SafeDumper):
+    """The safe dumper, which knows what this loader takes for a number: a name is no 1e5."""
+
+
 # YAML 1.2's floats: PyYAML wants a dot and a sign in the exponent, as no engineer writes.
-_Loader.add_implicit_resolver(
-    'tag:yaml.org,2002:float', re.compile(r'^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
-    list('-+.0123456789'))
+for _one in (_Loader, _Dumper):
+    _one.add_implicit_resolver(
+        'tag:yaml.org,2002:float', re.compile(r'^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
+        list('-+.0123456789'))
+
+
+def yaml_text(data: object, flow: bool | None = False) -> str:
+    """
+    Return plain data as YAML that :func:`read_yaml` reads as the same.
+
+    Parameters
+    ----------
+    data : object
+        Mappings, lists, texts and numbers.
+    flow : bool, optional
+        As `default_flow_style` of PyYAML.
+
+    Returns
+    -------
+    str
+    """
+    return str(yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True,
+                         default_flow_style=flow))
 
 
 def brief(error: Exception) -> str:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import difflib
 import enum
@@ -213,6 +213,29 @@ class Effect:
         """Names of its numbers by those that the edits of the graph know."""
         return {p.name.removesuffix(LATER): p.name for p in self.parameters()} if (
             self.again) else {}
+
+
+def check_distinct(effects: Iterable[Effect]) -> None:
+    """
+    Check that no two effects of a model share a parameter.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+
+    Raises
+    ------
+    ParameterError
+        If two do: it cannot be two numbers.
+    """
+    owners: dict[str, Effect] = {}
+    for effect in effects:
+        for name in (p.name for p in effect.parameters()):
+            other = owners.setdefault(name, effect)
+            if other is not effect:
+                raise ParameterError(
+                    f'effects {other.id}:{other.side} and {effect.id}:{effect.side} share the '
+                    f'parameter {name}; a model can hold one of them')
 
 
 def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:

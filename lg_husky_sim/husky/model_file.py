@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 import os
@@ -13,12 +13,11 @@ import tempfile
 from typing import Any
 
 from lg_husky_sim.errors import LgHuskyError, ModelFileError, ParameterError
-from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.effects import check_distinct, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import Drivetrain, Structure
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.resources import config_path
-from lg_husky_sim.yaml_files import read_yaml, shown
-import yaml
+from lg_husky_sim.yaml_files import read_yaml, shown, yaml_text
 
 SCHEMA = 'lg_husky_sim/model/1'
 _KEYS = {'value', 'unit', 'lower', 'upper', 'tolerance', 'free', 'source', 'low', 'high'}
@@ -119,10 +118,22 @@ def _effect(index: int, entry: object, shared: set[str]
     return effect, tuple(parameters)
 
 
+def _text(value: object) -> str:
+    # A key without a value is an empty text.
+    return '' if value is None else str(value)
+
+
+def _refuse_others(where: str, entry: Mapping[str, object], allowed: Sequence[str]) -> None:
+    other = next((key for key in entry if key not in allowed), None)
+    if other is not None:
+        raise ModelFileError(f'{where}: unknown key {shown(other)} (known: {", ".join(allowed)})')
+
+
 def _onset(data: object) -> Onset | None:
     if data is None:
         return None
     entry = _mapping('structure.onset', data)
+    _refuse_others('structure.onset', entry, ('kind', 'value', 'recording', 'earlier'))
     kinds = [kind.value for kind in OnsetKind]
     if entry.get('kind') not in kinds:
         raise ModelFileError(
@@ -132,7 +143,7 @@ def _onset(data: object) -> Onset | None:
         raise ModelFileError('structure.onset.earlier is not a list of names of recordings')
     return Onset(OnsetKind(entry['kind']), _number('structure.onset', 'value',
                                                    entry.get('value')),
-                 str(entry.get('recording', '')), tuple(earlier))
+                 _text(entry.get('recording')), tuple(earlier))
 
 
 def model_from_data(data: object, name: str) -> ModelFile:
@@ -163,6 +174,7 @@ def model_from_data(data: object, name: str) -> ModelFile:
         if unknown:
             raise ModelFileError(f'unknown key {shown(unknown[0])}')
         structure = _mapping('structure', content.get('structure', {}))
+        _refuse_others('structure', structure, ('drivetrain', 'onset'))
         drivetrains = [d.value for d in Drivetrain]
         drivetrain = structure.get('drivetrain', 'simplified')
         if drivetrain not in drivetrains:
@@ -175,6 +187,7 @@ def model_from_data(data: object, name: str) -> ModelFile:
             raise ModelFileError('effects is not a list')
         shared = {p.name for p in entries}
         effects = [_effect(i, entry, shared) for i, entry in enumerate(listed)]
+        check_distinct(effect for effect, _ in effects)
         shape = Structure(Drivetrain(drivetrain), tuple(effect for effect, _ in effects),
                           _onset(structure.get('onset')))
         parameters = Parameters(tuple(entries)).with_entries(
@@ -183,7 +196,7 @@ def model_from_data(data: object, name: str) -> ModelFile:
         missing = [p for p in nominal if p not in parameters]
         if missing:
             raise ModelFileError(f'parameter {missing[0]} is missing')
-        return ModelFile(shape, parameters, str(content.get('about', '')))
+        return ModelFile(shape, parameters, _text(content.get('about')))
     except LgHuskyError as error:
         raise ModelFileError(f'{name}: {error}') from error
 
@@ -303,7 +316,7 @@ def save_model(model: ModelFile, path: str | os.PathLike[str]) -> None:
     handle, temporary = tempfile.mkstemp(dir=place.parent, prefix=f'.{place.name}.')
     try:
         with os.fdopen(handle, 'w', encoding='utf-8') as stream:
-            yaml.safe_dump(model_data(model), stream, sort_keys=False, allow_unicode=True)
+            stream.write(yaml_text(model_data(model)))
         os.chmod(temporary, 0o644)
         os.replace(temporary, place)
     except BaseException:

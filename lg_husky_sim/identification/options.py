@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.effects import check_distinct, Effect
 from lg_husky_sim.husky.model_file import ModelFile
 
 
@@ -46,7 +46,7 @@ def with_effects(model: ModelFile, texts: Sequence[str]) -> ModelFile:
     Raises
     ------
     ParameterError
-        If one is unknown or does not fit.
+        If one is unknown or does not fit, or two share a parameter.
     """
     structure, parameters = model.structure, model.parameters
     for name in names_in(texts):
@@ -56,4 +56,5 @@ def with_effects(model: ModelFile, texts: Sequence[str]) -> ModelFile:
         structure = structure.with_effect(effect)
         parameters = parameters.with_entries(*(
             p.parameter() for p in effect.parameters() if p.name not in parameters))
+    check_distinct(structure.effects)
     return ModelFile(structure, parameters, model.about)

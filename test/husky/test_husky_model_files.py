@@ -76,7 +76,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path,
 
     def fail(*_: object, **__: object) -> None:
         raise OSError('no space')
-    monkeypatch.setattr(yaml, 'safe_dump', fail)
+    monkeypatch.setattr(yaml, 'dump', fail)
     with pytest.raises(OSError, match='no space'):
         save_model(load_model(), place)
     assert place.read_text() == 'the old one'
@@ -115,6 +115,11 @@ HOSTILE: list[tuple[Callable[[dict[str, Any]], None], str]] = [
      "structure.onset.kind = 'mood' is not one of time, place_above, place_below"),
     (put('structure', {'onset': {'kind': 'time', 'value': 'noon'}}),
      "structure.onset: value = 'noon' is not a number"),
+    (put('structure', {'drivetrian': 'expanded'}), "structure: unknown key 'drivetrian'"),
+    (put('structure', {'onset': {'kind': 'time', 'value': 1.0, 'recordng': 'rec2'}}),
+     "structure.onset: unknown key 'recordng'"),
+    (put('effects', [{'effect': 'encoder_scale', 'side': side} for side in ('left', 'right')]),
+     'effects encoder_scale:left and encoder_scale:right share the parameter encoder_factor'),
     (mass('value', 'heavy'), "mass: value = 'heavy' is not a number"),
     (mass('value', True), 'mass: value = True is not a number'),
     (mass('value', float('nan')), 'mass: value = nan is not finite'),
@@ -201,3 +206,22 @@ def test_a_changed_effect_survives_the_file(tmp_path: Path) -> None:
     again = load_model(tmp_path / 'model.yaml')
     assert again.structure == structure
     assert (again.parameters['latency'], again.parameters['latency_later']) == (0.1, 0.2)
+
+
+@pytest.mark.parametrize('name', ['1e5', '2E+3', '12', 'null', 'yes', 'a: b', 'mon/1e3'])
+def test_names_of_recordings_stay_names(tmp_path: Path, name: str) -> None:
+    model = with_effects(Effect('yaw_pull', late=True),
+                         onset=Onset(OnsetKind.TIME, 3.0, name, (f'{name}0', name + '1')))
+    save_model(model, tmp_path / 'model.yaml')
+    assert load_model(tmp_path / 'model.yaml').structure == model.structure
+
+
+def test_a_key_without_a_value_is_an_empty_text(tmp_path: Path) -> None:
+    data = model_data(with_effects(Effect('yaw_pull', late=True),
+                                   onset=Onset(OnsetKind.TIME, 3.0)))
+    data['about'] = None
+    data['structure']['onset']['recording'] = None  # type: ignore[index]
+    (tmp_path / 'model.yaml').write_text(yaml.safe_dump(data))
+    model = load_model(tmp_path / 'model.yaml')
+    assert model.about == ''
+    assert model.structure.onset == Onset(OnsetKind.TIME, 3.0)
