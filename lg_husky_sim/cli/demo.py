@@ -38,6 +38,7 @@ def command(out: Path, manoeuvre: str, model: str) -> None:
     check_folder(out)
     script = find_manoeuvre(manoeuvre)
     settings = make_settings()
+    from lg_husky_sim.ros import api
     from lg_husky_sim.ros.demo import isolate, run_demo
     from lg_husky_sim.ros.demo_report import read_drive, save_picture, summary_lines
     from tqdm import tqdm
@@ -47,8 +48,12 @@ def command(out: Path, manoeuvre: str, model: str) -> None:
         with tqdm(total=round(script.duration, 2), desc=f'driving the {script.name}',
                   bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s',
                   mininterval=0.1 if sys.stderr.isatty() else 5.0) as bar:
-            demo = run_demo(script, made / 'bag', settings, model,
-                            progress=lambda moment: bar.update(moment - bar.n))
+            try:
+                demo = run_demo(script, made / 'bag', settings, model,
+                                progress=lambda moment: bar.update(moment - bar.n))
+            except api.ExternalShutdownException:
+                # ROS 2 turns a signal into the end of the graph.
+                raise click.Abort from None
         drive = read_drive(made / 'bag', settings.command_topic,
                            f'/{settings.ground_truth_topic}', settings.odometry_topic)
         save_picture(drive, made / 'picture.png',

@@ -83,8 +83,9 @@ def initial_state(segment: Segment, plant: Plant, window: float = WINDOW) -> Ini
     if 'wheels' in streams:
         left, right = (float(rate) for rate in streams['wheels'].values[0])
         rates = (left, right)
-        forward, turning = _rolling(plant, left, right)
-        yaw = yaw if 'pose' in streams else turning
+        rolling = Simulator(plant, PERIOD).rolling(left, right)
+        forward = rolling.forward
+        yaw = yaw if 'pose' in streams else rolling.yaw
     if 'imu' in streams:
         yaw = float(streams['imu'].column('yaw_rate')[0])
     if 'wheel_angles' in streams:
@@ -148,11 +149,3 @@ def _rest(segment: Segment) -> float:
         return -1.0
     last = int(np.argmax(moving)) - 1 if np.any(moving) else len(wheels) - 1
     return float(wheels.times[last]) - segment.start
-
-
-def _rolling(plant: Plant, left: float, right: float) -> tuple[float, float]:
-    """Return speed [m/s] and yaw rate [rad/s] at which wheels of these rates do not slip."""
-    simulator = Simulator(plant, PERIOD)
-    ahead = sum(simulator.initial(twist=BodyTwist(1.0, 0.0)).wheel_rates) / 2.0
-    turning = simulator.initial(twist=BodyTwist(0.0, 1.0)).wheel_rates
-    return (0.5 * (left + right) / ahead, (right - left) / (turning[1] - turning[0]))

@@ -100,33 +100,40 @@ class Shadow:
         self._advance(moment)
         self._command, self._since = command, moment
 
-    def _advance(self, moment: float) -> None:
-        if self._state is None:
-            return
-        while self._state.time + PERIOD <= moment:
-            old = self.timeout > 0.0 and self._state.time - self._since > self.timeout
-            self._state = self._simulator.step(
-                self._state, BodyTwist(0.0, 0.0) if old else self._command)
+    def _advance(self, moment: float) -> SimulatorState | None:
+        state = self._state
+        if state is None or moment - state.time >= SILENCE:
+            self._state = None
+            return None
+        while state.time + PERIOD <= moment:
+            old = self.timeout > 0.0 and state.time - self._since > self.timeout
+            state = self._simulator.step(state, BodyTwist(0.0, 0.0) if old else self._command)
+        self._state = state
+        return state
 
     def wheels(self, moment: float, left: float, right: float) -> None:
         """Compare with measured wheel rates [rad/s]."""
-        if self._state is None or not 0.0 <= moment - self._state.time < SILENCE:
-            self._state = self._simulator.initial(time=moment, wheel_rates=(left, right))
+        state = None if self._state is None or moment < self._state.time else (
+            self._advance(moment))
+        if state is None:
+            # A robot that moves already rolls, and follows what it was told last.
+            self._state = self._simulator.initial(
+                time=moment, twist=self._simulator.rolling(left, right),
+                wheel_rates=(left, right), command=self._command)
             return
-        self._advance(moment)
         sensors = self.plant.sets[0].sensors
-        rates = self._state.wheel_rates
+        rates = state.wheel_rates
         for value, rate, factor in ((left, rates[0], sensors.encoder_left),
                                     (right, rates[1], sensors.encoder_right)):
             self.errors['wheel_rate'].add(moment, value - factor * rate)
 
     def gyro(self, moment: float, rate: float) -> None:
         """Compare with a measured yaw rate [rad/s]."""
-        if self._state is None:
+        state = self._advance(moment)
+        if state is None:
             return
-        self._advance(moment)
         sensors = self.plant.sets[0].sensors
-        expected = sensors.gyro_factor * self._state.twist.yaw + sensors.gyro_bias
+        expected = sensors.gyro_factor * state.twist.yaw + sensors.gyro_bias
         self.errors['yaw_rate'].add(moment, rate - expected)
 
 

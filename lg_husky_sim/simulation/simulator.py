@@ -30,13 +30,18 @@ class SimulatorState:
         Laid out as :mod:`lg_husky_sim.simulation.kernel` says; read-only.
     row : numpy.ndarray, shape (15,)
         The kernel's output columns at this moment; read-only.
-    n : int
-        States of graph and controllers.
+    states : tuple of str
+        Names of the states of graph and controllers.
     """
 
     flat: FloatArray
     row: FloatArray
-    n: int
+    states: tuple[str, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of states of graph and controllers."""
+        return len(self.states)
 
     @property
     def time(self) -> float:
@@ -161,7 +166,13 @@ class Simulator:
         row = np.zeros(len(COLUMNS))
         row[:4] = wanted
         row[7:13] = *wheel_angles, 0.0, pose.heading, pose.x, pose.y
-        return _state(flat, row, n)
+        return _state(flat, row, self.plant.states)
+
+    def rolling(self, left: float, right: float) -> BodyTwist:
+        """Return the velocity at which wheels of these rates [rad/s] do not slip."""
+        ahead = sum(self.initial(twist=BodyTwist(1.0, 0.0)).wheel_rates) / 2.0
+        turning = self.initial(twist=BodyTwist(0.0, 1.0)).wheel_rates
+        return BodyTwist(0.5 * (left + right) / ahead, (right - left) / (turning[1] - turning[0]))
 
     @cached_property
     def _steady(self) -> FloatArray:
@@ -202,7 +213,7 @@ class Simulator:
         out = np.empty((1, len(COLUMNS)))
         run(flat, np.array([[command.forward, command.yaw]]), out,
             *self.operators.arguments)  # type: ignore[arg-type]
-        return _state(flat, out[0], state.n)
+        return _state(flat, out[0], state.states)
 
     def run(self, state: SimulatorState, commands: FloatArray
             ) -> tuple[SimulatorState, FloatArray]:
@@ -227,7 +238,7 @@ class Simulator:
         run(flat, np.ascontiguousarray(commands, dtype=np.float64), out,
             *self.operators.arguments)  # type: ignore[arg-type]
         row = out[-1] if len(out) else state.row
-        return _state(flat, np.array(row), state.n), out
+        return _state(flat, np.array(row), state.states), out
 
     def adopt(self, state: SimulatorState) -> SimulatorState:
         """
@@ -240,12 +251,12 @@ class Simulator:
         Returns
         -------
         SimulatorState
-            Where the number of states differs, wheel rates, velocity, currents, angles and pose
+            Where the states are others, wheel rates, velocity, currents, angles and pose
             are kept, and the others (front axles, a controller's states) are those of the steady
             drive that comes nearest.
         """
         n = self.operators.n
-        if state.n == n:
+        if state.states == self.plant.states:
             return state
         one = self.plant.sets[0]
         steady = self._steady
@@ -254,13 +265,13 @@ class Simulator:
         flat = np.concatenate([nearest, state.flat[state.n:]])
         flat[:n] += np.linalg.lstsq(one.rows[:6], state.row[:6] - one.rows[:6] @ nearest,
                                     rcond=None)[0]
-        return _state(flat, np.array(state.row), n)
+        return _state(flat, np.array(state.row), self.plant.states)
 
 
-def _state(flat: FloatArray, row: FloatArray, n: int) -> SimulatorState:
+def _state(flat: FloatArray, row: FloatArray, states: tuple[str, ...]) -> SimulatorState:
     flat.setflags(write=False)
     row.setflags(write=False)
-    return SimulatorState(flat, row, n)
+    return SimulatorState(flat, row, states)
 
 
 def hold(commands: TimeSeries, start: float, period: float, count: int) -> FloatArray:

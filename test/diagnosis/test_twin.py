@@ -55,6 +55,27 @@ def test_shadow_of_the_robot_itself_has_no_error() -> None:
     assert shadow.errors['yaw_rate'].overall < 1e-9
 
 
+def test_joining_a_robot_in_motion_and_after_a_pause() -> None:
+    """It rolls already; and after a pause the models begin anew, whatever is heard first."""
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    robot, shadow = Shadow(plant), Shadow(plant)
+    robot.wheels(0.0, 0.0, 0.0)
+    robot.command(0.0, BodyTwist(0.5, 0.3))
+    for step in range(1, 900):
+        moment = 0.01 * step + 1e-6
+        robot._advance(moment)
+        assert robot._state is not None
+        if step == 300:
+            shadow.command(moment, BodyTwist(0.5, 0.3))
+        if 300 <= step < 400 or step >= 800:
+            shadow.gyro(moment, robot._state.twist.yaw)
+            shadow.wheels(moment, *robot._state.wheel_rates)
+    assert shadow.errors['wheel_rate'].count == 2 * (99 + 99)
+    assert shadow.errors['wheel_rate'].overall < 0.02
+    assert shadow.errors['yaw_rate'].overall < 0.01
+
+
 def test_stale_command_is_forgotten_as_the_base_does() -> None:
     model = load_model()
     shadow = Shadow(compile_model(model.structure).at(model.parameters), timeout=0.25)

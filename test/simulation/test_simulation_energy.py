@@ -113,7 +113,7 @@ def test_steps_never_gain_energy(effects: tuple[Effect, ...]) -> None:
         flat[:state.n] = random_states(weights, 1, seed)[0] * generator.uniform(0.1, 1.0)
         energies = [float(weights @ flat[:state.n] ** 2)]
         for _ in range(30):
-            simulator_state = type(state)(flat, state.row, state.n)
+            simulator_state = type(state)(flat, state.row, state.states)
             after, _ = simulator.run(simulator_state, np.zeros((1, 2)))
             flat = np.array(after.flat)
             energies.append(float(weights @ flat[:state.n] ** 2))

@@ -11,7 +11,10 @@ import subprocess
 import sys
 
 from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.husky.model import compile_model, Drivetrain, Structure
+from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.jit import compiled, SWITCH
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation import rollout, Simulator
@@ -195,6 +198,20 @@ def test_adopting_another_plant_does_not_jump(robot: Maker) -> None:
         back = simulator.adopt(adopted)
         assert back.twist.forward == pytest.approx(state.twist.forward)
         assert back.pose == state.pose
+
+
+def test_as_many_states_need_not_be_the_same_ones() -> None:
+    """A speed loop has as many as the expanded drivetrain has more."""
+    nominal = load_model()
+    looped = with_effects(nominal, ['speed_loop'])
+    one = compile_model(looped.structure).at(looped.parameters)
+    other = compile_model(Structure(Drivetrain.EXPANDED)).at(nominal.parameters)
+    assert len(one.states) == len(other.states)
+    state, _ = Simulator(one, 0.02).run(Simulator(one, 0.02).initial(),
+                                        np.tile([0.5, 0.0], (200, 1)))
+    exchanged = Simulator(other, 0.001)
+    after = exchanged.step(exchanged.adopt(state), BodyTwist(0.5, 0.0))
+    assert after.twist.forward == pytest.approx(state.twist.forward, abs=1e-3)
 
 
 def test_adopting_the_same_plant_changes_nothing(robot: Maker) -> None:
