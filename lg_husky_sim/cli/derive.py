@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
+    from lg_husky_sim.husky.model import Structure
+    from lg_husky_sim.husky.model_file import ModelFile
     from lg_husky_sim.linear_graph import LinearGraph, NumericModel
     from lg_husky_sim.linear_graph.netlist import Netlist
 
@@ -41,7 +43,7 @@ def command(model: str, outputs: tuple[str, ...], by_parameter: bool, latex: boo
     from lg_husky_sim.linear_graph.equations import equations
     from lg_husky_sim.linear_graph.report import latex_report, text_report
 
-    netlist = _load(model)
+    netlist, note = _load(model)
     wanted = outputs or netlist.outputs
     numeric = compile_numeric(netlist.graph, wanted, chained=True)
     symbolic = derive(netlist.graph, wanted, by_element=not by_parameter)
@@ -50,17 +52,17 @@ def command(model: str, outputs: tuple[str, ...], by_parameter: bool, latex: boo
         from lg_husky_sim.linear_graph.drawing import save_picture
         save_picture(netlist.graph, picture, title=netlist.name)
     if latex:
-        click.echo(latex_report(netlist.name, steps, symbolic))
+        click.echo(latex_report(netlist.name, steps, symbolic, note))
     else:
         click.echo(text_report(netlist.name, steps, symbolic,
                                None if by_parameter else netlist.graph,
-                               _with_numbers(numeric, netlist.values)))
+                               _with_numbers(numeric, netlist.values), note))
     if picture is not None:
         click.echo(f'picture: {picture}', err=True)
 
 
-def _load(model: str) -> Netlist:
-    """Find the graph that the option names, with numbers and outputs where there are any."""
+def _load(model: str) -> tuple[Netlist, str]:
+    """Find the graph with numbers and outputs that the option names, and what to note of it."""
     from lg_husky_sim.errors import ModelFileError
     from lg_husky_sim.husky import network
     from lg_husky_sim.husky.model_file import load_model
@@ -70,7 +72,7 @@ def _load(model: str) -> Netlist:
     if model in PAPER:
         graph = network.simplified() if model == 'simplified' else network.expanded()
         return Netlist(f'Husky, {model} drivetrain', graph, load_model().parameters,
-                       _paper_outputs(graph))
+                       _paper_outputs(graph)), ''
     path = Path(model)
     if path.suffix not in ('.yaml', '.yml'):
         raise ModelFileError(f'model {model!r} must be {", ".join(PAPER)} or a .yaml file')
@@ -79,10 +81,29 @@ def _load(model: str) -> Netlist:
     except ModelFileError as error:
         raise ModelFileError(f'{path}: {error}') from error
     if 'elements' in top:
-        return read_netlist(path)
+        return read_netlist(path), ''
     loaded = load_model(path)
     graph = loaded.structure.network().graph
-    return Netlist(loaded.about or path.stem, graph, loaded.parameters, _paper_outputs(graph))
+    return Netlist(loaded.about or path.stem, graph, _values(loaded),
+                   _paper_outputs(graph)), _left_out(loaded.structure)
+
+
+def _values(model: ModelFile) -> Mapping[str, float]:
+    """Return the parameters by the names of the graph, where changed effects have others."""
+    values = dict(model.parameters)
+    for effect in model.structure.in_force():
+        values.update({name: model.parameters[own] for name, own in effect.renamed.items()})
+    return values
+
+
+def _left_out(structure: Structure) -> str:
+    """Name the effects that are no part of the graph."""
+    from lg_husky_sim.husky.effects import Subsystem
+
+    names = dict.fromkeys(effect.id for effect in structure.in_force() if effect.kind.subsystem
+                          in (Subsystem.COMMAND, Subsystem.SENSOR))
+    return ('Not in the matrices and poles, which are those of the graph alone: '
+            f'{", ".join(names)}') if names else ''
 
 
 def _paper_outputs(graph: LinearGraph) -> tuple[str, ...]:

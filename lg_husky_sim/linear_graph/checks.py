@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lg_husky_sim.errors import GraphError
-from lg_husky_sim.linear_graph.elements import Branch, Domain, Kind, TwoPort
+from lg_husky_sim.linear_graph.elements import Branch, Domain, Kind, SOURCES, TwoPort
 
 if TYPE_CHECKING:
     from lg_husky_sim.linear_graph.graph import Edge, LinearGraph, Node
@@ -43,6 +43,28 @@ def check_complete(graph: LinearGraph) -> None:
     """
     _check_through_cuts(graph)
     _check_open_ends(graph)
+
+
+def check_symbols(graph: LinearGraph) -> None:
+    """
+    Check that an element's name and the parameters of laws can stand in one equation.
+
+    Raises
+    ------
+    GraphError
+        If a law has a parameter with the name of an element whose value is another one.
+    """
+    elements: list[Branch | TwoPort] = [*graph.branches, *graph.two_ports]
+    values = {e.name: e.value for e in elements if e.characteristic is None
+              and not (isinstance(e, Branch) and e.kind in SOURCES)}
+    for element in elements:
+        if element.characteristic is None:
+            continue
+        for name in element.characteristic.parameters:
+            if values.get(name, name) != name:
+                raise GraphError(
+                    f'parameter {name!r} of the law of {element.name!r} has the name of element '
+                    f'{name!r}, whose value is {values[name]!r}; give one of them another name')
 
 
 def _check_names(graph: LinearGraph) -> None:

@@ -125,7 +125,7 @@ def _nodes(axes: Any, block: Block) -> None:
                   markeredgecolor='white', markeredgewidth=0.8, zorder=7)
         at_top = y - block.y >= HEIGHT - 1e-9
         axes.text(x if at_top else x - 0.15, y + 0.16 if at_top else y, name, fontsize=6.5,
-                  color='0.3', ha='center' if at_top else 'right',
+                  parse_math=False, color='0.3', ha='center' if at_top else 'right',
                   va='bottom' if at_top else 'center', style='italic', zorder=8,
                   bbox={'facecolor': 'white', 'alpha': 0.7, 'edgecolor': 'none', 'pad': 0.4})
 
@@ -202,7 +202,8 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
     axes = figure.add_axes((0.0, 0.0, 1.0, height * SCALE / inches))
     draw_graph(axes, graph, culprits=culprits, new=new)
     if title:
-        figure.suptitle(title, fontsize=11, y=1.0 - 0.4 * HEADING / inches, va='center')
+        figure.suptitle(title, fontsize=11, y=1.0 - 0.4 * HEADING / inches, va='center',
+                        parse_math=False)
     # a fixed salt and no date: the same graph gives the same file
     with tempfile.TemporaryDirectory(dir=path.parent) as folder, rc_context(
             {'svg.hashsalt': 'lg_husky_sim', 'svg.fonttype': 'none'}):

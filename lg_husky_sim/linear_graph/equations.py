@@ -166,9 +166,10 @@ def _law(structure: Structure, edge: int, texts: Mapping[str, str]) -> Constitut
     owner = graph.edges[edge].owner
     primary, secondary = structure.primary(edge).name, structure.dual(edge).name
     if owner.characteristic is not None:
-        known = structure.laws.get(edge, owner.characteristic)
+        known = structure.laws.get(edge) or structure.linear_laws[edge]
         arguments = dict(zip(known.arguments, known.of, strict=True))
-        law = re.sub(r'\bz\d+\b', lambda match: arguments[match.group()], known.expression)
+        law = re.sub(r'\bz\d+\b', lambda match: arguments.get(match.group(), match.group()),
+                     known.expression)
         latex = _value_latex(known.expression, {
             name: latex_of(text) for name, text in arguments.items()})
         return Constitutive(owner.name, f'{primary} = {law}',

@@ -10,10 +10,11 @@ the functions of :data:`FUNCTIONS`; nothing else is ever compiled or evaluated.
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 import keyword
 import math
+import operator
 from types import CodeType
 from typing import Any, TypeGuard
 
@@ -28,7 +29,9 @@ MAX_LENGTH = 500
 MAX_DEPTH = 40
 MAX_EXPONENT = 16.0
 
-_BINARY = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
+_BINARY: Mapping[type[ast.operator], Callable[[float, float], Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+    ast.Div: operator.truediv, ast.Pow: operator.pow}
 _UNARY = (ast.UAdd, ast.USub)
 
 
@@ -56,7 +59,7 @@ def parse(text: str) -> ast.expr:
     Raises
     ------
     GraphError
-        If the text is no such expression.
+        If the text is no such expression, or a constant in it cannot be evaluated.
     """
     if len(text) > MAX_LENGTH:
         raise GraphError(f'expression of {len(text)} characters is longer than {MAX_LENGTH}')
@@ -67,13 +70,54 @@ def parse(text: str) -> ast.expr:
         raise GraphError(f'expression {shown} cannot be read: it must be made of names, numbers, '
                          f'+ - * / ** and {", ".join(FUNCTIONS)}') from error
     _check(tree, shown, MAX_DEPTH)
+    try:
+        _constant(tree)
+    except (ArithmeticError, ValueError) as error:
+        why = 'division by zero' if isinstance(error, ZeroDivisionError) else (
+            'too large' if isinstance(error, OverflowError) else 'not real')
+        raise GraphError(f'expression {shown} cannot be evaluated: {why}') from error
     return tree
+
+
+def _constant(node: ast.expr) -> float | None:
+    """
+    Return the value of a checked expression without names, or None.
+
+    Raises
+    ------
+    OverflowError, ZeroDivisionError, ValueError
+        If such an expression, or one inside it, has no finite real value.
+    """
+    value: float | complex | None = None
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            value = float(number)
+        case ast.Name(id=name):
+            value = CONSTANTS.get(name)
+        case ast.UnaryOp(op=op, operand=operand):
+            value = _constant(operand)
+            if value is not None and isinstance(op, ast.USub):
+                value = -value
+        case ast.Call(func=ast.Name(id=name), args=[argument]):
+            inner = _constant(argument)
+            value = None if inner is None else FUNCTIONS[name](inner)
+        case ast.BinOp(left=left, op=op, right=right):
+            one, two = _constant(left), _constant(right)
+            if isinstance(op, ast.Div) and two == 0.0:
+                raise ZeroDivisionError
+            if one is not None and two is not None:
+                value = _BINARY[type(op)](one, two)
+    if isinstance(value, complex):
+        raise ValueError
+    if value is not None and not math.isfinite(value):
+        raise OverflowError
+    return value
 
 
 def _check(node: ast.expr, shown: str, depth: int) -> None:
     if depth <= 0:
         raise GraphError(f'expression {shown} is nested deeper than {MAX_DEPTH} levels')
-    if isinstance(node, ast.BinOp) and isinstance(node.op, _BINARY):
+    if isinstance(node, ast.BinOp) and isinstance(node.op, tuple(_BINARY)):
         _check(node.left, shown, depth - 1)
         _check(node.right, shown, depth - 1)
         if isinstance(node.op, ast.Pow):

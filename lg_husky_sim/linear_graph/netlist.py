@@ -17,7 +17,8 @@ One entry an element, by its everyday name::
       J:     {is: inertia, from: shaft, value: 1e-3 kg·m²}
     outputs: [omega(J), i(L)]
 
-``to`` is ground where it is left out. A value is an expression in the parameters, or a number
+``to`` is the ground of its domain (``ground:``, or a node called ground) where it is left out.
+A value is an expression in the parameters, or a number
 with a unit, which then is a parameter of the element's name.
 """
 
@@ -30,7 +31,7 @@ import re
 from typing import Any
 
 from lg_husky_sim.errors import GraphError, ModelFileError
-from lg_husky_sim.linear_graph.checks import check_complete
+from lg_husky_sim.linear_graph.checks import check_complete, check_symbols
 from lg_husky_sim.linear_graph.elements import (
     Branch,
     Characteristic,
@@ -67,6 +68,7 @@ ELEMENTS: Mapping[str, tuple[Kind, Domain]] = {
 _TOP = {'name', 'about', 'ground', 'parameters', 'elements', 'outputs'}
 _ONE = {'is', 'from', 'to', 'value', 'form', 'law', 'of', 'parameters'}
 _TWO = {'is', 'port 1', 'port 2', 'value', 'law', 'of', 'parameters'}
+Ground = str | dict[Domain, str]
 _QUANTITY = re.compile(r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*', re.ASCII)
 
 
@@ -158,6 +160,7 @@ def _netlist(data: Any) -> Netlist:
         values[name] = number
         if unit:
             units[name] = unit
+    ground = _ground(top.get('ground', GROUND))
     elements = _mapping(top.get('elements'), 'elements', None)
     if not elements:
         raise ModelFileError('elements is empty; give at least one')
@@ -165,7 +168,7 @@ def _netlist(data: Any) -> Netlist:
     two_ports: list[TwoPort] = []
     for name, given in elements.items():
         try:
-            element = _element(name, given, values, units)
+            element = _element(name, given, values, units, ground)
         except (GraphError, ModelFileError) as error:
             message = str(error)
             raise ModelFileError(message if repr(name) in message else
@@ -174,8 +177,9 @@ def _netlist(data: Any) -> Netlist:
             branches.append(element)
         else:
             two_ports.append(element)
-    graph = LinearGraph(tuple(branches), tuple(two_ports), _ground(top.get('ground', GROUND)))
+    graph = LinearGraph(tuple(branches), tuple(two_ports), ground)
     check_complete(graph)
+    check_symbols(graph)
     check_units(graph, units)
     outputs = tuple(_texts(top.get('outputs') or [], 'outputs'))
     for output in outputs:
@@ -198,7 +202,7 @@ def _names(element: Branch | TwoPort) -> tuple[str, ...]:
 
 
 def _element(name: str, given: Any, values: dict[str, float], units: dict[str, str],
-             ) -> Branch | TwoPort:
+             ground: Ground) -> Branch | TwoPort:
     if not is_name(name):
         raise ModelFileError(f'element name {name!r} must be letters, digits and _')
     entry = _mapping(given, f'element {name!r}', None)
@@ -206,7 +210,8 @@ def _element(name: str, given: Any, values: dict[str, float], units: dict[str, s
     two_ports = {kind.value: kind for kind in TWO_PORT_KINDS}
     if what in two_ports:
         _known(entry, f'element {name!r}', _TWO)
-        ports = [_port(entry.get(f'port {number}'), f'port {number}') for number in (1, 2)]
+        ports = [_port(entry.get(f'port {number}'), f'port {number}', ground)
+                 for number in (1, 2)]
         law = _law(entry)
         two_port = TwoPort(name, two_ports[what], ports[0], ports[1], '' if law else '1',
                            characteristic=law)
@@ -225,7 +230,7 @@ def _element(name: str, given: Any, values: dict[str, float], units: dict[str, s
             raise ModelFileError(f'form {text!r} must be one of {", ".join(forms)}')
         form = forms[text]
     law = _law(entry)
-    tail, head = _node(entry, 'from', None), _node(entry, 'to', GROUND)
+    tail, head = _node(entry, 'from', None), _node(entry, 'to', _ground_of(ground, domain))
     if law is not None:
         return Branch(name, kind, domain, tail, head, form=form, characteristic=law)
     if kind in SOURCES:
@@ -278,21 +283,27 @@ def _law(entry: Mapping[str, Any]) -> Characteristic | None:
                           tuple(_texts(entry.get('parameters', []), 'parameters')))
 
 
-def _port(given: Any, what: str) -> Port:
+def _port(given: Any, what: str, ground: Ground) -> Port:
     entry = _mapping(given, what, {'domain', 'from', 'to'})
     domains = {domain.value: domain for domain in Domain}
     text = _text(entry.get('domain', ''), 'domain')
     if text not in domains:
         raise ModelFileError(f'{what}: domain {text!r} must be one of {", ".join(domains)}')
-    return domains[text], _node(entry, 'from', None), _node(entry, 'to', GROUND)
+    domain = domains[text]
+    return domain, _node(entry, 'from', None), _node(entry, 'to', _ground_of(ground, domain))
 
 
-def _ground(given: Any) -> str | dict[Domain, str]:
+def _ground(given: Any) -> Ground:
     if isinstance(given, str):
         return given
     domains = {domain.value: domain for domain in Domain}
     entry = _mapping(given, 'ground', set(domains))
     return {domains[key]: _text(node, 'ground') for key, node in entry.items()}
+
+
+def _ground_of(ground: Ground, domain: Domain) -> str:
+    # a domain without ground is refused by the graph
+    return ground if isinstance(ground, str) else ground.get(domain, GROUND)
 
 
 def _node(entry: Mapping[str, Any], key: str, default: str | None) -> str:

@@ -21,10 +21,19 @@ Row = dict[int, Any]
 
 
 def to_sympy(text: str) -> Any:
-    """Return an expression of the graph as a SymPy expression in plain symbols."""
+    """
+    Return an expression of the graph as a SymPy expression in plain symbols.
+
+    Raises
+    ------
+    GraphError
+        If it divides by zero whatever its parameters are.
+    """
     import sympy
 
     expression = _convert(parse(text))
+    if expression.has(sympy.zoo, sympy.nan):
+        raise GraphError(f'expression {text!r} divides by zero whatever its parameters are')
     if expression.atoms(sympy.Function) or any(
             not power.exp.is_Integer for power in expression.atoms(sympy.Pow)):
         # whoever writes abs() expects either sign

@@ -25,7 +25,8 @@ _SHAPES = {'A': ('states', 'states'), 'B': ('states', 'inputs'), 'C': ('outputs'
 
 def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
                 graph: LinearGraph | None = None,
-                numbers: tuple[NumericModel, Mapping[str, float]] | None = None) -> str:
+                numbers: tuple[NumericModel, Mapping[str, float]] | None = None,
+                note: str = '') -> str:
     """
     Write a derivation as plain text.
 
@@ -41,6 +42,8 @@ def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
         Given, the elements' values are listed (where the equations write element names).
     numbers : tuple of (NumericModel, mapping), optional
         Given, the poles are listed.
+    note : str
+        A line to write after the matrices.
 
     Returns
     -------
@@ -67,7 +70,7 @@ def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
         matrix = getattr(model, name)
         if _is_shown(name, matrix):
             parts += [f'{name} ({" by ".join(_SHAPES[name])})', *_table(matrix), '']
-    return '\n'.join((*parts, poles)).rstrip()
+    return '\n'.join((*parts, *[note] * bool(note), poles)).rstrip()
 
 
 def _is_shown(name: str, matrix: Any) -> bool:
@@ -109,7 +112,8 @@ def _poles(model: NumericModel, values: Mapping[str, float]) -> str:
     return f'Poles with the numbers of the model [1/s]: {shown}'
 
 
-def latex_report(title: str, steps: Equations, model: SymbolicStateSpace) -> str:
+def latex_report(title: str, steps: Equations, model: SymbolicStateSpace,
+                 note: str = '') -> str:
     """
     Write a derivation as LaTeX (needs amsmath).
 
@@ -121,6 +125,8 @@ def latex_report(title: str, steps: Equations, model: SymbolicStateSpace) -> str
         Kirchhoff's laws and constitutive equations.
     model : SymbolicStateSpace
         The result.
+    note : str
+        A line to write below the title, as a comment.
 
     Returns
     -------
@@ -128,14 +134,22 @@ def latex_report(title: str, steps: Equations, model: SymbolicStateSpace) -> str
     """
     import sympy
 
-    parts = [f'% {" ".join(title.split())}', steps.latex, '% State-space model']
-    state, inputs, output = (_column(names) for names in
-                             (model.states, model.inputs, model.outputs))
-    drive = rf' + B {inputs}' if model.inputs else ''
-    effort = rf' + G {_column(model.efforts)}' if model.efforts else ''
-    parts.append(rf'\[ \frac{{d}}{{dt}} {state} = A {state}{drive}{effort} \]')
-    if model.outputs:
-        parts.append(rf'\[ {output} = C {state}' + (rf' + D {inputs}' if drive else '') + r' \]')
+    parts = [*(f'% {" ".join(text.split())}' for text in (title, note) if text), steps.latex,
+             '% State-space model']
+    state, inputs, effort = (_column(names) for names in
+                             (model.states, model.inputs, model.efforts))
+    rate = rf'\frac{{d}}{{dt}} {inputs}'
+    for left, shown, terms in (
+            (rf'\frac{{d}}{{dt}} {state}', model.states,
+             (('A', state), ('B', inputs), ('E', rate), ('G', effort))),
+            (_column(model.outputs), model.outputs,
+             (('C', state), ('D', inputs), ('F', rate), ('L_c', effort))),
+            (_column(model.arguments), model.arguments,
+             (('H', state), ('K', inputs), ('N', effort)))):
+        if shown:
+            right = ' + '.join(f'{matrix} {column}' for matrix, column in terms
+                               if _is_shown(matrix, getattr(model, matrix)))
+            parts.append(rf'\[ {left} = {right or 0} \]')
     for name in MATRICES:
         matrix = getattr(model, name)
         if _is_shown(name, matrix):

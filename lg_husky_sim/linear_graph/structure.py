@@ -96,6 +96,8 @@ class Structure:
         Edges whose value is a named effort.
     laws : mapping of int to Characteristic
         The law of each effort.
+    linear_laws : mapping of int to Characteristic
+        The law of each other edge that has one; it is also in ``terms``.
     algebraic : tuple of int
         Edges solved for.
     terms : tuple of Term
@@ -120,6 +122,7 @@ class Structure:
     input_edges: tuple[tuple[int, int], ...]
     efforts: tuple[int, ...]
     laws: Mapping[int, Characteristic]
+    linear_laws: Mapping[int, Characteristic]
     algebraic: tuple[int, ...]
     terms: tuple[Term, ...]
     values: tuple[Value, ...]
@@ -201,7 +204,7 @@ def analyse(graph: LinearGraph, outputs: Sequence[str] = ()) -> Structure:
         graph, tree, _secondary(graph, in_tree), in_tree, states,
         tuple(edge for edge in storages if edge in dependent),
         tuple(builder.inputs), tuple(builder.input_edges), tuple(builder.laws),
-        builder.laws,
+        builder.laws, builder.linear_laws,
         tuple(dict.fromkeys(builder.algebraic)), tuple(builder.terms), tuple(builder.values),
         builder.storage_values,
         frozenset(at for at, branch in enumerate(graph.branches) if branch.is_stiffness),
@@ -225,7 +228,8 @@ _Part = tuple[int, bool, int, Variable]
 def modulated(ratio: Characteristic, inverse: bool, sign: int, variable: str) -> Characteristic:
     """Return the law of one port of a modulated two-port: sign * ratio^(+-1) * variable."""
     last = f'z{len(ratio.of) + 1}'
-    factor = f'{last}/({ratio.expression})' if inverse else f'({ratio.expression})*{last}'
+    value = ratio.expression if ratio.expression.isidentifier() else f'({ratio.expression})'
+    factor = f'{last}/{value}' if inverse else f'{value}*{last}'
     return Characteristic(f'-{factor}' if sign < 0 else factor, (*ratio.of, variable),
                           ratio.parameters, ratio.modulated)
 
@@ -238,6 +242,7 @@ class _Builder:
         self.inputs: list[str] = []
         self.input_edges: list[tuple[int, int]] = []
         self.laws: dict[int, Characteristic] = {}
+        self.linear_laws: dict[int, Characteristic] = {}
         self.arguments: list[Variable] = []
         self.algebraic: list[int] = []
         self.terms: list[Term] = []
@@ -279,6 +284,7 @@ class _Builder:
             self.laws[edge] = characteristic
             self.arguments += sources
             return
+        self.linear_laws[edge] = characteristic
         self.algebraic.append(edge)
         name = self.graph.edges[edge].name
         for argument, source in zip(characteristic.arguments, sources, strict=True):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.errors import GraphError
+from lg_husky_sim.linear_graph.checks import check_symbols
 from lg_husky_sim.linear_graph.graph import LinearGraph, Variable
 from lg_husky_sim.linear_graph.numeric import NumericModel
 from lg_husky_sim.linear_graph.rational import add_scaled, RationalField, Row, solve
@@ -107,10 +108,13 @@ def derive(graph: LinearGraph, outputs: Sequence[str] = (), *,
     Raises
     ------
     GraphError
-        As :func:`~lg_husky_sim.linear_graph.compile_numeric`.
+        As :func:`~lg_husky_sim.linear_graph.compile_numeric`; by element also if a parameter of a
+        law has the name of an element of another value.
     """
     import sympy
 
+    if by_element:
+        check_symbols(graph)
     structure = analyse(graph, outputs)
     NumericModel(structure, chained=True)     # refuses loops through non-linear laws
     texts = [value.owner if by_element and value.rule != 'any' else value.text

@@ -7,6 +7,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from lg_husky_sim.cli.main import run
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model import compile_model, Structure
+from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'examples' / 'linear_graph'
@@ -76,3 +80,117 @@ def test_bad_input_is_one_line_and_exit_code_1(
     assert shown.err.count('\n') == 1
     assert shown.out == ''
     assert list(tmp_path.iterdir()) == []
+
+
+LATE = {'payload_mass': 5.0, 'payload_inertia': 0.4, 'payload_mass_later': 50.0,
+        'payload_inertia_later': 4.0}
+
+
+def diagnosed(*more: Effect) -> ModelFile:
+    """Return a model with a payload that changes, and further effects."""
+    effects = (Effect('payload'), Effect('payload', late=True, again=True), *more)
+    nominal = load_model()
+    parameters = nominal.parameters.with_entries(*(
+        p.parameter(LATE.get(p.name)) for effect in effects for p in effect.parameters()))
+    return ModelFile(Structure(effects=effects, onset=Onset(OnsetKind.TIME, 0.0)), parameters)
+
+
+def test_a_changed_effect_has_its_later_numbers(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, model = tmp_path / 'model.yaml', diagnosed()
+    save_model(model, path)
+    assert run(['derive', '--model', str(path)]) == 0
+    shown = capsys.readouterr().out
+    mass = model.parameters['mass'] + 50.0
+    assert f'  M_H = mass + payload_mass = {mass:g} kg' in shown.replace('mass+p', 'mass + p')
+    poles = [float(text) for text in shown.partition('[1/s]: ')[2].split(', ')]
+    before, after = (np.sort(np.linalg.eigvals(part.a).real) for part in compile_model(
+        model.structure).at(model.parameters).sets)
+    np.testing.assert_allclose(poles, after, rtol=1e-5)
+    assert not np.allclose(poles, before, rtol=1e-3)
+    assert 'Not in the matrices' not in shown
+
+
+@pytest.mark.parametrize('form', [[], ['--latex']])
+def test_effects_outside_the_graph_are_named(
+        form: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'model.yaml'
+    save_model(diagnosed(Effect('speed_loop'), Effect('encoder_scale', side='left')), path)
+    assert run(['derive', '--model', str(path), *form]) == 0
+    line = ('Not in the matrices and poles, which are those of the graph alone: '
+            'speed_loop, encoder_scale')
+    assert ('% ' * bool(form) + line) in capsys.readouterr().out.splitlines()
+
+
+def latex(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    path = folder / 'graph.yaml'
+    path.write_text(text, encoding='utf-8')
+    assert run(['derive', '--model', str(path), '--latex']) == 0
+    short = capsys.readouterr().out.replace(r'\begin{bmatrix} ', '[').replace(
+        r' \end{bmatrix}', ']')
+    return short.splitlines()
+
+
+def test_latex_has_the_rates_of_inputs(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shown = latex("""
+        elements:
+          V_s: {is: voltage source, from: a}
+          C_1: {is: capacitor, from: a, to: b, value: 1}
+          C_2: {is: capacitor, from: b, value: 1}
+          R:   {is: resistor, from: b, value: 1}
+        outputs: [i(C_1)]
+        """, tmp_path, capsys)
+    assert (r'\[ \frac{d}{dt} [V_{C_{1}}] = A [V_{C_{1}}] + B [V_{s}] '
+            r'+ E \frac{d}{dt} [V_{s}] \]') in shown
+    assert (r'\[ [i_{C_{1}}] = C [V_{C_{1}}] + D [V_{s}] '
+            r'+ F \frac{d}{dt} [V_{s}] \]') in shown
+
+
+def test_latex_has_the_efforts_and_their_arguments(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shown = latex("""
+        elements:
+          F_s: {is: force source, from: ground, to: body}
+          m:   {is: mass, from: body, value: 1}
+          d:   {is: damper, from: body, law: quadratic, of: [v(d)], parameters: [p]}
+        outputs: [F(m), v(m)]
+        """, tmp_path, capsys)
+    assert r'\[ \frac{d}{dt} [v_{m}] = A [v_{m}] + B [F_{s}] + G [d] \]' in shown
+    assert r'\[ [F_{m} \\ v_{m}] = C [v_{m}] + D [F_{s}] + L_c [d] \]' in shown
+    assert r'\[ [v_{d}] = H [v_{m}] \]' in shown
+
+
+def test_a_linear_law_of_a_two_port_is_written_out(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'graph.yaml'
+    path.write_text("""
+        parameters: {n: 2}
+        elements:
+          V_s: {is: voltage source, from: a}
+          R:   {is: resistor, from: a, to: b, value: 1}
+          T:   {is: transformer, law: n, parameters: [n],
+                port 1: {domain: electrical, from: b}, port 2: {domain: rotational, from: s}}
+          J:   {is: inertia, from: s, value: 1}
+          G:   {is: gyrator, law: 2*n, parameters: [n],
+                port 1: {domain: rotational, from: s}, port 2: {domain: rotational, from: t}}
+          B:   {is: rotary damper, from: t, value: 1}
+        """, encoding='utf-8')
+    assert run(['derive', '--model', str(path)]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    for line in ('V(T.1) = n * omega(T.2)', 'tau(T.2) = -n * i(T.1)',
+                 'tau(G.1) = -omega(G.2) / (2 * n)', 'tau(G.2) = omega(G.1) / (2 * n)'):
+        assert f'  {line}' in shown, line
+
+
+@pytest.mark.parametrize('form', [[], ['--parameters'], ['--latex']])
+def test_a_constant_without_a_value_is_one_line(
+        form: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'graph.yaml'
+    path.write_text('elements: {R: {is: resistor, from: b, value: 1/0}, '
+                    'C: {is: capacitor, from: b, value: c}}', encoding='utf-8')
+    assert run(['derive', '--model', str(path), *form]) == 1
+    shown = capsys.readouterr()
+    assert shown.err == (f"error: {path}: branch 'R': expression '1/0' cannot be evaluated: "
+                         'division by zero\n')
+    assert shown.out == ''

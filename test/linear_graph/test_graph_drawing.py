@@ -109,3 +109,13 @@ def test_wrong_endings_and_folders_are_named(husky: LinearGraph, tmp_path: Path)
         save_picture(husky, tmp_path / 'g.gif')
     with pytest.raises(FileNotFoundError):
         save_picture(husky, tmp_path / 'none' / 'g.svg')
+
+
+def test_dollar_signs_are_plain_text(tmp_path: Path) -> None:
+    graph = LinearGraph((
+        Branch('R', Kind.D_TYPE, Domain.ELECTRICAL, r'$\foo$', 'ground', 'R'),
+        Branch('C', Kind.A_TYPE, Domain.ELECTRICAL, r'$\foo$', 'ground', 'C')))
+    picture = save_picture(graph, tmp_path / 'g.svg', title=r'cost $\foo$ \$1 demo')
+    root = Xml.fromstring(picture.read_text(encoding='utf-8'))
+    text = {''.join(element.itertext()).strip() for element in root.iter()}
+    assert {r'cost $\foo$ \$1 demo', r'$\foo$'} <= text

@@ -4,11 +4,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 import re
 
-from lg_husky_sim.errors import ModelFileError
-from lg_husky_sim.linear_graph import compile_numeric, derive, Domain, Form, Kind
+from lg_husky_sim.errors import GraphError, ModelFileError
+from lg_husky_sim.linear_graph import (
+    Characteristic,
+    compile_numeric,
+    derive,
+    Domain,
+    Form,
+    Kind,
+)
 from lg_husky_sim.linear_graph.netlist import ELEMENTS, parse_netlist, read_netlist
 import numpy as np
 import pytest
@@ -110,3 +118,87 @@ def test_files_that_are_none(tmp_path: Path) -> None:
         path.write_text(text, encoding='utf-8')
         with pytest.raises(ModelFileError, match=str(path)):
             read_netlist(path)
+
+
+GROUNDED = """
+ground: {ground}
+elements:
+  V_s: {{is: voltage source, from: a{to}}}
+  R:   {{is: resistor, from: a, to: b, value: 1}}
+  C:   {{is: capacitor, from: b{to}, value: 1}}
+  R_2: {{is: resistor, from: b{to}, value: 1}}
+  T:   {{is: transformer, value: 1, port 1: {{domain: electrical, from: b{to}}},
+        port 2: {{domain: rotational, from: s{turning}}}}}
+  J:   {{is: inertia, from: s{turning}, value: 1}}
+"""
+
+
+@pytest.mark.parametrize(('ground', 'node', 'turning'), [
+    ('gnd', 'gnd', 'gnd'), ('{electrical: gnd, rotational: frame}', 'gnd', 'frame')])
+def test_what_is_left_out_is_the_ground_of_the_file(ground: str, node: str, turning: str) -> None:
+    short = parse_netlist(GROUNDED.format(ground=ground, to='', turning=''))
+    full = parse_netlist(GROUNDED.format(ground=ground, to=f', to: {node}',
+                                         turning=f', to: {turning}'))
+    assert short.graph == full.graph
+
+
+def test_a_source_finds_its_way_back_through_the_ground_of_the_file() -> None:
+    found = parse_netlist("""
+        ground: gnd
+        elements:
+          V_s: {is: voltage source, from: a, to: gnd}
+          R:   {is: resistor, from: a, to: b, value: 1}
+          C:   {is: capacitor, from: b, value: 1}
+          R_2: {is: resistor, from: b, value: 1}
+        """)
+    space = compile_numeric(found.graph).at(found.values)
+    assert (space.A.tolist(), space.B.tolist()) == ([[-2.0]], [[1.0]])
+
+
+def test_a_domain_without_ground_is_named() -> None:
+    with pytest.raises(ModelFileError, match='the rotational domain has no ground'):
+        parse_netlist(GROUNDED.format(ground='{electrical: gnd}', to='', turning=''))
+
+
+MERGING = """
+parameters: {r_0: 2, R: 3}
+elements:
+  R: {is: resistor, from: b, value: r_0}
+  C: {is: capacitor, from: b, value: 1}
+  I: {is: current source, from: b, law: R*z, of: [V(C)], parameters: [R]}
+"""
+
+
+def test_a_law_s_parameter_may_not_have_the_name_of_another_value() -> None:
+    message = ("parameter 'R' of the law of 'I' has the name of element 'R', whose value is 'r_0';"
+               ' give one of them another name')
+    with pytest.raises(ModelFileError, match=f'^netlist: {message}$'):
+        parse_netlist(MERGING)
+    apart = parse_netlist(MERGING.replace('R*z', 'g*z').replace('[R]', '[g]')
+                          .replace('R: 3', 'g: 3'))
+    assert str(derive(apart.graph, by_element=True).A[0, 0]) == '(-R*g - 1)/(C*R)'
+    one = parse_netlist(MERGING.replace('value: r_0', 'value: R').replace('r_0: 2, ', ''))
+    assert str(derive(one.graph, by_element=True).A[0, 0]) == '(-R**2 - 1)/(C*R)'
+    merged = apart.graph.replacing(replace(
+        apart.graph.branches[2], characteristic=Characteristic('R*z', ('V(C)',), ('R',))))
+    with pytest.raises(GraphError, match=message):
+        derive(merged, by_element=True)
+    assert str(derive(merged).A[0, 0]) == '(-R*r_0 - 1)/(C*r_0)'
+
+
+@pytest.mark.parametrize(('value', 'why'), [
+    ('1/0', 'division by zero'), ('k/(2 - 2)', 'division by zero'),
+    ('k + sqrt(-1)', 'not real'), ('(1 - 2)**0.5', 'not real'), ('k*exp(1000)', 'too large'),
+    ('1e200*1e200', 'too large'), ('((9**16)**16)**16', 'too large')])
+def test_constants_that_cannot_be_evaluated_are_refused(value: str, why: str) -> None:
+    text = f'elements: {{R: {{is: resistor, from: b, value: {value}}}, ' \
+        'C: {is: capacitor, from: b, value: c}}'
+    with pytest.raises(ModelFileError, match=f"branch 'R': .* cannot be evaluated: {why}$"):
+        parse_netlist(text)
+
+
+def test_a_division_by_zero_in_symbols_is_refused() -> None:
+    found = parse_netlist('elements: {R: {is: resistor, from: b, value: 1/(a - a)}, '
+                          'C: {is: capacitor, from: b, value: c}}')
+    with pytest.raises(GraphError, match=r"expression '1/\(a - a\)' divides by zero whatever"):
+        derive(found.graph)
