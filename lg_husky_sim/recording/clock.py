@@ -26,6 +26,8 @@ OUTLIER_NS = 1_000_000_000
 """A header this far from its neighbours' delay is wrong."""
 SKEW_NS = 500_000_000
 """Two clocks this far apart are different clocks."""
+FOREIGN_NS = 10 * SKEW_NS
+"""No sensor takes this long before it sends."""
 LONGEST_NS = 30 * 86_400 * 1_000_000_000
 """No recording is longer; a longer one has damaged stamps."""
 
@@ -52,13 +54,16 @@ def common_clock(streams: Mapping[str, Stamps]) -> tuple[dict[str, IntArray], li
     Put all streams on one clock.
 
     Streams with header stamps keep them; zero and outlying ones are filled in from the log time.
-    A stream whose clock runs apart from the others' is shifted onto theirs. Streams without
-    headers take the log time, shifted onto the headers' clock where that is another one. If the
-    two clocks do not run at one rate (a replay at another speed), all take log times.
+    A stream whose header time runs back far, as after the reset of a simulator, counts as one
+    without headers. One stamped stream is the reference, the wheels where they are, and a
+    stream whose clock runs apart from it is shifted onto it. Streams without headers take the
+    log time, shifted onto the reference's clock where that is another one. If the clocks do not
+    run at one rate (a replay at another speed), all take log times.
 
     Parameters
     ----------
     streams : mapping of str to Stamps
+        By name; those of transforms are ``parent>child``.
 
     Returns
     -------
@@ -73,39 +78,121 @@ def common_clock(streams: Mapping[str, Stamps]) -> tuple[dict[str, IntArray], li
         If the times span more than 30 days.
     """
     notes: list[str] = []
-    headers: dict[str, IntArray] = {}
-    for name, stamps in streams.items():
-        mended = _mended(name, stamps, notes)
-        if mended is not None:
-            headers[name] = mended
+    headers = _headers(streams, notes)
     delays = {name: header - streams[name].logged for name, header in headers.items()}
-    times: dict[str, IntArray] = {}
-    unstamped = [name for name in streams if name not in delays]
-    middle = {name: int(np.median(delay)) for name, delay in delays.items()}
-    common = int(np.median(list(middle.values()))) if middle else 0
-    drift = max((int(np.ptp(np.quantile(delay, (0.05, 0.95)))) for delay in delays.values()),
-                default=0)
-    if unstamped and drift > SKEW_NS:
+    reference = min(delays, key=_trust, default='')
+    gaps = {name: _gap(name, reference, streams, delays) for name in delays}
+    drift = max((abs(_drift(name, gap)) for name, gap in gaps.items()), default=0)
+    if len(delays) < len(streams):
+        drift = max((drift, *(int(np.ptp(np.quantile(delay, (0.05, 0.95))))
+                              for delay in delays.values())))
+    if drift > SKEW_NS:
         notes.append(f'header clock and log clock drift by {drift * 1e-9:.1f} s: '
                      'log times taken throughout')
         times = {name: stamps.logged for name, stamps in streams.items()}
     else:
-        for name, stamps in streams.items():
-            if name not in headers:
-                shift = common if abs(common) > SKEW_NS else 0
-                if shift:
-                    notes.append(f'{name} has no header stamps: log times shifted by '
-                                 f'{shift * 1e-9:.3f} s onto the header clock')
-                times[name] = stamps.logged + shift
-            elif abs(middle[name] - common) > 10 * SKEW_NS:
-                shift = common - middle[name]
-                notes.append(f'{name} runs on a clock of its own: shifted by '
-                             f'{shift * 1e-9:.3f} s')
-                times[name] = headers[name] + shift
-            else:
-                times[name] = headers[name]
+        common = int(np.median(delays[reference])) if reference else 0
+        times = {name: headers[name] + _shift(name, reference, gaps[name], notes)
+                 if name in headers else stamps.logged + _onto_headers(name, common, notes)
+                 for name, stamps in streams.items()}
     _check_span(times)
     return times, notes
+
+
+def _headers(streams: Mapping[str, Stamps], notes: list[str]) -> dict[str, IntArray]:
+    """Return the header stamps of the streams that have sensible ones, gaps filled in."""
+    headers: dict[str, IntArray] = {}
+    for name, stamps in streams.items():
+        mended = _mended(name, stamps, notes)
+        if mended is None:
+            continue
+        back = _step_back(stamps.logged, mended)
+        if back:
+            notes.append(f'{name}: header time runs back by {back * 1e-9:.1f} s: '
+                         'log times taken for it')
+        else:
+            headers[name] = mended
+    return headers
+
+
+def _step_back(logged: IntArray, header: IntArray) -> int:
+    """
+    Return the largest step back of the header time that lasts [ns], 0 without one.
+
+    A few old messages that come late are none: the delay is as before after them.
+    """
+    if _frozen(logged):
+        return 0
+    delay, steps = header - logged, np.diff(header)
+    far = [place for place in np.argsort(steps)[:NEIGHBOURS] if steps[place] < -OUTLIER_NS]
+    return max((int(-steps[place]) for place in far
+                if np.median(delay[:place + 1]) - np.median(delay[place + 1:]) > OUTLIER_NS),
+               default=0)
+
+
+def _trust(name: str) -> int:
+    """Return the rank of a stream as reference: poses come late, commands from elsewhere."""
+    ranks = {'wheels': 0, 'imu': 1, 'command': 3}
+    return 4 if '>' in name else ranks.get(name, 2)
+
+
+def _gap(name: str, reference: str, streams: Mapping[str, Stamps],
+         delays: Mapping[str, IntArray]) -> IntArray:
+    """
+    Return how far a stream's header clock is ahead of the reference's [ns].
+
+    One value a message while both were logged. Where log times do not tell (all alike, or
+    nothing logged while the other was), one value, and 0 unless it is very large.
+    """
+    logged, base = streams[name].logged, streams[reference].logged
+    common = int(np.median(delays[reference]))
+    both = (logged >= base.min()) & (logged <= base.max())
+    if _frozen(logged) or _frozen(base) or not np.any(both):
+        apart = int(np.median(delays[name])) - common
+        return np.array([apart if abs(apart) > FOREIGN_NS else 0])
+    order = np.argsort(base, kind='stable')
+    expected = np.interp((logged[both] - base[order[0]]).astype(np.float64),
+                         (base[order] - base[order[0]]).astype(np.float64),
+                         (delays[reference][order] - common).astype(np.float64))
+    gap: IntArray = delays[name][both] - common - np.rint(expected).astype(np.int64)
+    return gap
+
+
+def _drift(name: str, gap: IntArray) -> int:
+    """Return by how much a gap grows from its first to its last quarter [ns]."""
+    quarter = max(1, gap.size // 4)
+    first, last = int(np.median(gap[:quarter])), int(np.median(gap[-quarter:]))
+    return 0 if _late(name, min(first, last)) and max(first, last) <= SKEW_NS else last - first
+
+
+def _late(name: str, apart: int) -> bool:
+    """Say whether a sensor's stamps may be so far behind just because it takes its time."""
+    return name != 'command' and -FOREIGN_NS <= apart < -SKEW_NS
+
+
+def _shift(name: str, reference: str, gap: IntArray, notes: list[str]) -> int:
+    apart = int(np.median(gap))
+    if abs(apart) <= SKEW_NS:
+        return 0
+    if _late(name, apart):
+        notes.append(f'{name} is stamped {-apart * 1e-9:.3f} s earlier than {reference} logged '
+                     'with it: late, or a clock of its own; left as it is')
+        return 0
+    notes.append(f'{name} runs on a clock of its own: shifted by {-apart * 1e-9:.3f} s')
+    return -apart
+
+
+def _onto_headers(name: str, common: int, notes: list[str]) -> int:
+    if abs(common) <= SKEW_NS:
+        return 0
+    notes.append(f'{name} has no header stamps: log times shifted by {common * 1e-9:.3f} s '
+                 'onto the header clock')
+    return common
+
+
+def _frozen(logged: IntArray) -> bool:
+    """Say whether a bag was converted without log times."""
+    return logged.size > 1 and bool(np.all(logged == logged[0]))
 
 
 def _mended(name: str, stamps: Stamps, notes: list[str]) -> IntArray | None:
@@ -118,8 +205,7 @@ def _mended(name: str, stamps: Stamps, notes: list[str]) -> IntArray | None:
     usual = np.empty(header.size, dtype=np.int64)
     usual[there] = median_filter(delay, size=min(NEIGHBOURS, delay.size), mode='nearest')
     usual[~there] = int(np.median(delay))
-    frozen = logged.size > 1 and bool(np.all(logged == logged[0]))  # converted without log times
-    wrong = ~there if frozen else ~there | (np.abs(header - logged - usual) > OUTLIER_NS)
+    wrong = ~there if _frozen(logged) else ~there | (np.abs(header - logged - usual) > OUTLIER_NS)
     header[wrong] = (logged + usual)[wrong]
     if np.any(wrong):
         notes.append(f'{name}: {np.count_nonzero(wrong)} of {wrong.size} header stamps are zero '

@@ -14,8 +14,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lg_husky_sim.recording.clock import Stamps
-from lg_husky_sim.recording.frames import plain_frame, quaternion_heading
-from lg_husky_sim.recording.wheels import side_means, Sides, wheel_sides
+from lg_husky_sim.recording.frames import quaternion_heading, whole_frame
+from lg_husky_sim.recording.wheels import (
+    named_wheels,
+    side_means,
+    Sides,
+    unwrapped_means,
+    wheel_sides,
+    WRAP,
+)
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -49,16 +56,35 @@ class Rows:
 
 @dataclass
 class Collected:
-    """What the messages of one topic gave: rows by name, and why others gave none."""
+    """
+    What the messages of one topic gave: rows by name, and why others gave none.
+
+    `turned` has the angles of each joint for each row of wheels, None if they do not wrap.
+    """
 
     rows: dict[str, Rows] = field(default_factory=dict)
     seen: set[str] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+    named: bool = False
+    turned: list[tuple[dict[str, float], dict[str, float]]] | None = field(default_factory=list)
 
     def into(self, name: str, width: int) -> Rows:
         """Return the rows of a name, new ones at first."""
         if name not in self.rows:
             self.rows[name] = Rows(width)
         return self.rows[name]
+
+    def settle(self) -> None:
+        """Mend what only shows in all messages: wheels of one side that wrap one by one."""
+        turned, self.turned = self.turned, None
+        means = unwrapped_means(turned) if turned else None
+        if means is None:
+            return
+        rows = self.rows['wheels']
+        rows.values = [(*row[:2], float(left), float(right), *row[4:])
+                       for row, (left, right) in zip(rows.values, means, strict=True)]
+        self.notes.append('wheels: front and rear positions wrap at different moments; each '
+                          'joint was unwrapped before the mean')
 
 
 def edge_name(parent: str, child: str) -> str:
@@ -91,8 +117,26 @@ def _wheels(into: Collected, logged: int, message: Any) -> None:
         return
     if not names:
         into.seen.add(f'{count} values without names')
-    into.into('wheels', WHEEL_COLUMNS).add(
-        logged, header_ns(message), _wheel_row(message, sides))
+    named = named_wheels(tuple(names))
+    if into.named and not named:
+        return
+    if named and not into.named:  # what came before was no wheels, but a gripper's joints
+        into.named = True
+        into.rows.pop('wheels', None)
+        into.turned = []
+    row = _wheel_row(message, sides)
+    into.into('wheels', WHEEL_COLUMNS).add(logged, header_ns(message), row)
+    if abs(row[2]) > WRAP or abs(row[3]) > WRAP:
+        into.turned = None
+    if into.turned is not None:
+        left, right = (_angles(message, places) for places in sides)
+        into.turned.append((left, right))
+
+
+def _angles(message: Any, places: tuple[int, ...]) -> dict[str, float]:
+    return {message.name[place] if len(message.name) else str(place):
+            float(message.position[place])
+            for place in places if place < len(message.position)}
 
 
 def _wheel_row(message: Any, sides: Sides) -> tuple[float, ...]:
@@ -108,7 +152,7 @@ def _imu(into: Collected, logged: int, message: Any) -> None:
 
 def _pose(into: Collected, logged: int, stamp: int, edge: tuple[str, str],
           where: Any, turned: Any) -> None:
-    parent, child = plain_frame(edge[0]), plain_frame(edge[1])
+    parent, child = whole_frame(edge[0]), whole_frame(edge[1])
     into.seen.add(f'{parent} -> {child}')
     heading = quaternion_heading(turned.x, turned.y, turned.z, turned.w)
     into.into(edge_name(parent, child), 3).add(

@@ -25,6 +25,41 @@ def plain_frame(name: str) -> str:
     return name.strip('/').rsplit('/', 1)[-1]
 
 
+@lru_cache(maxsize=256)
+def whole_frame(name: str) -> str:
+    """Return a frame name with its namespace, without leading slash."""
+    return name.strip('/')
+
+
+def frame_space(name: str) -> str:
+    """Return the first part of a frame's namespace, empty without one."""
+    return name.partition('/')[0] if '/' in name else ''
+
+
+def told_apart(edges: Collection[Edge]) -> dict[Edge, Edge]:
+    """
+    Give transforms the names they go by.
+
+    Parameters
+    ----------
+    edges : collection of (parent, child)
+        Transforms recorded, with namespaces.
+
+    Returns
+    -------
+    dict of (parent, child) to (parent, child)
+        Plain names to those given; where the plain ones do not tell all apart, or the frames
+        are those of several robots, those given to themselves.
+    """
+    plain = {(plain_frame(parent), plain_frame(child)): (parent, child)
+             for parent, child in edges}
+    spaces = {frame_space(frame) for edge in edges for frame in edge
+              if plain_frame(frame) in (*ODOM_FRAMES, *BASE_FRAMES)} - {''}
+    if len(plain) == len(set(edges)) and len(spaces) < 2:
+        return plain
+    return {edge: edge for edge in edges}
+
+
 def quaternion_heading(x: float, y: float, z: float, w: float) -> float:
     """
     Return the yaw angle [rad] of a quaternion, which need not have norm one.
@@ -37,7 +72,7 @@ def quaternion_heading(x: float, y: float, z: float, w: float) -> float:
 
 
 def pose_chain(
-    edges: Collection[Edge], odom_frame: str = '', base_frame: str = '',
+    edges: Collection[Edge], odom_frame: str = '', base_frame: str = '', robot: str = '',
 ) -> tuple[Edge, ...]:
     """
     Choose the transforms that make up the pose of the base.
@@ -48,9 +83,11 @@ def pose_chain(
     Parameters
     ----------
     edges : collection of (parent, child)
-        Transforms recorded, names without slash and namespace.
+        Transforms recorded, as `told_apart` names them.
     odom_frame, base_frame : str
         Frames wished for; an empty one is free.
+    robot : str
+        Namespace preferred where frames have one.
 
     Returns
     -------
@@ -64,12 +101,13 @@ def pose_chain(
     """
     tree = sorted(edges)
     if odom_frame or base_frame:
-        return _wished(tree, plain_frame(odom_frame), plain_frame(base_frame))
+        return _wished(tree, odom_frame, base_frame, robot)
     ranked = sorted(
-        (_rank(parent, ODOM_FRAMES, ('odom', 'map', 'world')),
-         _rank(child, BASE_FRAMES, ('base', 'footprint', 'husky')), (parent, child))
+        (_rank(plain_frame(parent), ODOM_FRAMES, ('odom', 'map', 'world')),
+         _rank(plain_frame(child), BASE_FRAMES, ('base', 'footprint', 'husky')),
+         frame_space(child) != robot, (parent, child))
         for parent, child in tree)
-    for parent_rank, child_rank, edge in ranked:
+    for parent_rank, child_rank, _, edge in ranked:
         if parent_rank < UNLIKE and child_rank < UNLIKE:
             return (edge,)
     return ()
@@ -113,19 +151,32 @@ def _rank(name: str, known: tuple[str, ...], parts: tuple[str, ...]) -> int:
     return ALIKE if any(part in name.lower() for part in parts) else UNLIKE
 
 
-def _wished(tree: list[Edge], top: str, bottom: str) -> tuple[Edge, ...]:
-    frames = sorted({frame for edge in tree for frame in edge})
-    for frame in (top, bottom):
-        if frame and frame not in frames:
-            raise RecordingError(f'no frame {frame!r}; there are {", ".join(frames) or "none"}')
-    for start in [top] if top else [frame for frame in ODOM_FRAMES if frame in frames]:
-        for end in [bottom] if bottom else [frame for frame in BASE_FRAMES if frame in frames]:
+def _wished(tree: list[Edge], top: str, bottom: str, robot: str) -> tuple[Edge, ...]:
+    frames = sorted({frame for edge in tree for frame in edge},
+                    key=lambda frame: (frame_space(frame) != robot, frame))
+    starts, ends = _meant(top, ODOM_FRAMES, frames), _meant(bottom, BASE_FRAMES, frames)
+    for start in starts:
+        for end in ends:
             chain = _way(tree, start, end)
             if chain:
                 return chain
     raise RecordingError(
         f'no way from frame {top or "odom"} to {bottom or "base_link"}; transforms: '
         + ', '.join(f'{parent} -> {child}' for parent, child in tree))
+
+
+def _meant(wish: str, known: tuple[str, ...], frames: list[str]) -> list[str]:
+    """Return the frames that a wish may mean, all known ones without a wish."""
+    if not wish:
+        return [frame for name in known for frame in frames if plain_frame(frame) == name]
+    told_plainly = not any('/' in frame for frame in frames)
+    name = plain_frame(wish) if told_plainly else whole_frame(wish)
+    meant = [name] if name in frames else [
+        frame for frame in frames if plain_frame(frame) == name]
+    if not meant:
+        raise RecordingError(
+            f'no frame {wish!r}; there are {", ".join(sorted(frames)) or "none"}')
+    return meant
 
 
 def _way(tree: list[Edge], start: str, end: str) -> tuple[Edge, ...]:

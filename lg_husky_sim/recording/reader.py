@@ -14,10 +14,25 @@ from lg_husky_sim.recording.bags import Bag, open_bag, SUFFIXES
 from lg_husky_sim.recording.clean import clean, joined, Sample, wheel_streams
 from lg_husky_sim.recording.clock import common_clock
 from lg_husky_sim.recording.decode import Collected, COLLECTORS, edge_name, Rows
-from lg_husky_sim.recording.frames import compose, Edge, pose_chain
+from lg_husky_sim.recording.frames import (
+    compose,
+    Edge,
+    frame_space,
+    plain_frame,
+    pose_chain,
+    told_apart,
+)
 from lg_husky_sim.recording.names import printable
 from lg_husky_sim.recording.recording import CHANNELS, Recording
-from lg_husky_sim.recording.topics import candidates, listing, ODOMETRY, Topic, TopicMap, TYPES
+from lg_husky_sim.recording.topics import (
+    candidates,
+    listing,
+    ODOMETRY,
+    robots,
+    Topic,
+    TopicMap,
+    TYPES,
+)
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 
@@ -63,21 +78,25 @@ def read_recording(path: str | PathLike[str], topics: TopicMap | None = None) ->
     chosen = topics or TopicMap()
     with open_bag(place) as bag:
         present = bag.topics()
-        found = _collect(bag, present, chosen)
+        several = robots(present, chosen)
+        found = _collect(bag, present, chosen, several)
     try:
-        return _recording(place, present, found, chosen)
+        return _recording(place, present, found, chosen, several)
     except RecordingError as error:
         raise RecordingError(f'cannot use {place}: {error}') from error
 
 
-def _collect(bag: Bag, present: tuple[Topic, ...], chosen: TopicMap) -> dict[str, _Found]:
+def _collect(
+    bag: Bag, present: tuple[Topic, ...], chosen: TopicMap, several: tuple[str, ...],
+) -> dict[str, _Found]:
     """Read the likeliest topic of each role; the next one where it gave nothing."""
-    waiting = {role: list(candidates(role, present, getattr(chosen, role))) for role in TYPES}
+    waiting = {role: list(candidates(role, present, getattr(chosen, role), several[1:]))
+               for role in TYPES}
     found: dict[str, _Found] = {}
     while any(waiting.values()):
         attempt = {role: topics.pop(0) for role, topics in waiting.items() if topics}
         for role, collected in _read(bag, attempt).items():
-            if _serves(role, collected, chosen):
+            if _serves(role, collected, chosen, several):
                 found[role] = _Found(attempt[role], collected)
                 waiting[role] = []
             else:  # kept for the message that nothing serves
@@ -95,36 +114,54 @@ def _read(bag: Bag, attempt: Mapping[str, Topic]) -> dict[str, Collected]:
     for place, logged, message in bag.messages(tuple(by_topic)):
         for collect, into in takers[place]:
             collect(into, logged, message)
+    for into in collected.values():
+        into.settle()
     return collected
 
 
-def _serves(role: str, collected: Collected, chosen: TopicMap) -> bool:
+def _serves(
+    role: str, collected: Collected, chosen: TopicMap, several: tuple[str, ...],
+) -> bool:
     if role == 'pose':
-        return bool(_chain(collected, chosen))
+        return bool(_chain(collected, chosen, several)[0])
     return bool(collected.rows)
 
 
-def _chain(collected: Collected, chosen: TopicMap) -> tuple[Edge, ...]:
+def _chain(
+    collected: Collected, chosen: TopicMap, several: tuple[str, ...],
+) -> tuple[tuple[Edge, ...], dict[Edge, Edge]]:
+    """Return the transforms of the pose, and under which names all were recorded."""
     edges = [(name.split('>')[0], name.split('>')[1]) for name in collected.rows]
-    return pose_chain(edges, chosen.odom_frame, chosen.base_frame)
+    if not (chosen.odom_frame or chosen.base_frame):
+        others = set(several[1:]) - {''}
+        edges = [edge for edge in edges if frame_space(edge[1]) not in others]
+    told = told_apart(edges)
+    robot = several[0] if several else ''
+    return pose_chain(told, chosen.odom_frame, chosen.base_frame, robot), told
 
 
 def _recording(
     path: Path, present: tuple[Topic, ...], found: Mapping[str, _Found], chosen: TopicMap,
+    several: tuple[str, ...],
 ) -> Recording:
     notes: list[str] = []
+    if several:
+        notes.append(f'topics of several robots: those of /{several[0]} are read, not those of '
+                     f'/{", /".join(several[1:])}; --topic chooses another')
     chain: tuple[Edge, ...] = ()
     rows: dict[str, Rows] = {}
     origin: dict[str, str] = {}
     for role, entry in found.items():
+        given = entry.collected.rows
         if role == 'pose':
-            chain = _chain(entry.collected, chosen)
-            names = [edge_name(*edge) for edge in chain]
-        else:
-            names = list(entry.collected.rows)
+            chain, told = _chain(entry.collected, chosen, several)
+            given = {edge_name(*edge): given[edge_name(*told[edge])] for edge in chain}
+            notes += _alike(chain, told, chosen)
+        names = list(given)
+        notes += entry.collected.notes
         for name in names:
             if name not in rows:
-                rows[name] = entry.collected.rows[name]
+                rows[name] = given[name]
                 origin['pose' if role == 'pose' else name] = entry.topic.name
         if not names and role in ('wheels', 'pose'):
             seen = ', '.join(sorted(entry.collected.seen)) or 'nothing'
@@ -155,6 +192,20 @@ def _recording(
         frames=(chain[0][0], chain[-1][1]) if chain else ('', ''),
         present={topic.name: topic.kind for topic in present},
         notes=tuple(notes))
+
+
+def _alike(chain: tuple[Edge, ...], told: Mapping[Edge, Edge], chosen: TopicMap) -> list[str]:
+    """Return a note if other transforms have the plain names of the one taken."""
+    if not chain or chosen.odom_frame or chosen.base_frame:
+        return []
+    plain = [plain_frame(frame) for frame in chain[0]]
+    others = [edge for edge in told if edge != chain[0]
+              and [plain_frame(frame) for frame in edge] == plain]
+    if not others:
+        return []
+    words = ', '.join(f'{parent} -> {child}' for parent, child in sorted(others))
+    return [f'several transforms of one name: {chain[0][0]} -> {chain[0][1]} is read, not '
+            f'{words}; --topic odom_frame=NAME chooses another']
 
 
 def _streams(

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 
 from lg_husky_sim.errors import RecordingError
@@ -39,6 +39,12 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     'status': ('status',),
 }
 """Endings of topic names, the best first."""
+
+TELLING = ('command', 'wheels', 'imu', 'pose')
+"""Roles by whose topics a namespace is known to be a robot's."""
+
+PARTS = ('platform', 'sensors', 'husky_velocity_controller', 'platform_velocity_controller')
+"""Namespaces of a robot's parts."""
 
 SOURCES = ('joy', 'teleop', 'marker', 'autonomous', 'external', 'nav')
 """Words in the names of command topics that are only one of several inputs of a multiplexer."""
@@ -111,7 +117,77 @@ class Topic:
     count: int
 
 
-def candidates(role: str, present: Iterable[Topic], chosen: str = '') -> tuple[Topic, ...]:
+def robots(present: Iterable[Topic], chosen: TopicMap) -> tuple[str, ...]:
+    """
+    Return the namespaces of several robots in one bag, first the one to read.
+
+    Two namespaces are two robots if both have topics for two roles that tell. The one chosen
+    by hand is read, else the one with most roles, else with the likeliest topics.
+
+    Parameters
+    ----------
+    present : iterable of Topic
+        Topics of the bag.
+    chosen : TopicMap
+        Topics and frames chosen by hand.
+
+    Returns
+    -------
+    tuple of str
+        Empty if there are not two; an empty string is the robot without namespace.
+    """
+    topics = tuple(present)
+    roles: dict[str, list[str]] = {}
+    for role in TELLING:
+        for topic in candidates(role, topics):
+            space = space_of(role, topic.name)
+            if (space is None or _is_source(topic.name)
+                    or (space == '' and topic.kind in TRANSFORMS)):  # all robots share /tf
+                continue
+            if role not in roles.setdefault(space, []):
+                roles[space].append(role)
+    found = [space for space in roles
+             if any(len(set(roles[space]) & set(roles[other])) >= 2
+                    for other in roles if other != space)]
+    names = [_likely_space(role, getattr(chosen, role))
+             for role in TELLING if getattr(chosen, role)]
+    names += [whole.split('/')[0]
+              for whole in (chosen.odom_frame.strip('/'), chosen.base_frame.strip('/'))
+              if '/' in whole]
+    wished = next((name for name in names if name in found), None)
+    return tuple(sorted(found, key=lambda space: (space != wished, -len(roles[space]))))
+
+
+def space_of(role: str, name: str) -> str | None:
+    """Return the robot's namespace in a topic's name, None if its ending is not known."""
+    plain = name.strip('/')
+    endings = [ending for ending in NAMES[role]
+               if plain == ending or plain.endswith('/' + ending)]
+    if not endings:
+        return None
+    space = plain[:-len(max(endings, key=len))].strip('/').split('/')[0]
+    return '' if space in PARTS else space
+
+
+def _likely_space(role: str, name: str) -> str:
+    """Return the robot's namespace in a topic's name, its first part where it is not known."""
+    space = space_of(role, name)
+    return name.strip('/').split('/')[0] if space is None else space
+
+
+def _foreign(role: str, topic: Topic, others: Collection[str]) -> bool:
+    """Say whether a topic belongs to a robot that is not to be read."""
+    space = _likely_space(role, topic.name)
+    return space in others and not (space == '' and topic.kind in TRANSFORMS)
+
+
+def _is_source(name: str) -> bool:
+    return any(word in name.lower() for word in SOURCES)
+
+
+def candidates(
+    role: str, present: Iterable[Topic], chosen: str = '', others: Collection[str] = (),
+) -> tuple[Topic, ...]:
     """
     Return the topics that may hold a role, the likeliest first.
 
@@ -123,6 +199,8 @@ def candidates(role: str, present: Iterable[Topic], chosen: str = '') -> tuple[T
         Topics of the bag.
     chosen : str
         Topic chosen by hand; empty to look for one.
+    others : collection of str
+        Namespaces of robots that are not to be read.
 
     Returns
     -------
@@ -146,7 +224,9 @@ def candidates(role: str, present: Iterable[Topic], chosen: str = '') -> tuple[T
         if rank == len(NAMES[role]) and (role in NEEDS_NAME or generic):
             continue
         fallback = topic.kind == ODOMETRY  # only where no tf serves
-        source = role == 'command' and any(word in topic.name.lower() for word in SOURCES)
+        if _foreign(role, topic, others):
+            continue
+        source = role == 'command' and _is_source(topic.name)
         ranked.append((fallback, rank, source, -topic.count, topic.name, topic))
     return tuple(entry[-1] for entry in sorted(ranked, key=lambda entry: entry[:-1]))
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 import math
 import re
@@ -18,6 +18,9 @@ RIGHT_TOKENS = frozenset({'r', 'fr', 'rr', 'br', 'mr', 'rf', 'rb'})
 NOT_DRIVEN = ('caster', 'steer', 'arm', 'gripper', 'finger', 'flipper')
 NAMELESS = {2: ((0,), (1,)), 4: ((0, 2), (1, 3))}
 """Left and right places without names: left, right; or front then rear, each left, right."""
+
+WRAP = math.pi + 1e-6
+"""No angle that wraps is larger [rad]."""
 
 Sides = tuple[tuple[int, ...], tuple[int, ...]]
 
@@ -46,13 +49,18 @@ def wheel_sides(names: Sequence[str], count: int) -> Sides | None:
 def _sides(names: tuple[str, ...], count: int) -> Sides | None:
     if not names:
         return NAMELESS.get(count)
-    driven = [(place, name.lower()) for place, name in enumerate(names)
-              if not any(word in name.lower() for word in NOT_DRIVEN)]
-    if any('wheel' in name for _, name in driven):
+    driven = [(place, name.lower()) for place, name in enumerate(names) if _driven(name)]
+    if named_wheels(names):
         driven = [(place, name) for place, name in driven if 'wheel' in name]
     left = tuple(place for place, name in driven if _side(name) == 'left')
     right = tuple(place for place, name in driven if _side(name) == 'right')
     return (left, right) if left and right else None
+
+
+@lru_cache(maxsize=256)
+def named_wheels(names: tuple[str, ...]) -> bool:
+    """Say whether a joint is called a wheel; then those that are not are none."""
+    return any('wheel' in name.lower() for name in names if _driven(name))
 
 
 def side_means(values: Sequence[float] | FloatArray, sides: Sides) -> tuple[float, float]:
@@ -120,10 +128,55 @@ def unwrapped(angles: FloatArray) -> FloatArray:
     -------
     numpy.ndarray, shape (n, k)
     """
-    wraps = (angles.size > 0 and float(np.max(np.abs(angles))) <= np.pi + 1e-6
+    wraps = (angles.size > 0 and float(np.max(np.abs(angles))) <= WRAP
              and bool(np.any(np.abs(np.diff(angles, axis=0)) > np.pi)))
     result: FloatArray = np.unwrap(angles, axis=0) if wraps else angles
     return result
+
+
+def unwrapped_means(
+    turned: Sequence[tuple[Mapping[str, float], Mapping[str, float]]],
+) -> FloatArray | None:
+    """
+    Average the angles of each side after each joint was unwrapped by itself.
+
+    Front and rear wheels wrap at different moments, so their mean jumps by pi at each.
+
+    Parameters
+    ----------
+    turned : sequence of two mappings of str to float
+        Angles [rad] of the left and of the right joints, one entry a message.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n, 2), or None
+        Left and right [rad], NaN where no value is there; None where the joints of a side wrap
+        together or not at all, so that nothing is to be mended.
+    """
+    means, apart = np.full((len(turned), 2), np.nan), False
+    for side in (0, 1):
+        joints = sorted({joint for entry in turned for joint in entry[side]})
+        angles = np.array([[entry[side].get(joint, math.nan) for joint in joints]
+                           for entry in turned], dtype=np.float64).reshape(len(turned), -1)
+        there = np.isfinite(angles)
+        if np.any(np.abs(angles[there]) > WRAP):
+            return None
+        turns = np.zeros(angles.shape)
+        for column in range(len(joints)):
+            rows = there[:, column]
+            raw = angles[rows, column]
+            turns[rows, column] = np.rint((np.unwrap(raw) - raw) / (2.0 * np.pi))
+        most = np.max(np.where(there, turns, -np.inf), axis=1, initial=-np.inf)
+        least = np.min(np.where(there, turns, np.inf), axis=1, initial=np.inf)
+        apart = apart or bool(np.any(most > least))
+        count = np.count_nonzero(there, axis=1)
+        total = np.sum(np.where(there, angles + 2.0 * np.pi * turns, 0.0), axis=1)
+        means[count > 0, side] = total[count > 0] / count[count > 0]
+    return means if apart else None
+
+
+def _driven(name: str) -> bool:
+    return not any(word in name.lower() for word in NOT_DRIVEN)
 
 
 def _side(name: str) -> str:

@@ -75,7 +75,8 @@ class BagWriter:
 
     def transforms(self, logged: float,
                    entries: Sequence[tuple[str, str, float, float, float]], *,
-                   scale: float = 1.0, topic: str = '/tf') -> None:
+                   scale: float = 1.0, topic: str = '/tf',
+                   stamp: float | None = None) -> None:
         kind = 'tf2_msgs/msg/TFMessage'
         made = []
         for parent, child, x, y, heading in entries:
@@ -84,7 +85,7 @@ class BagWriter:
                             scale * float(np.cos(heading / 2)))
             made.append(self.new(
                 'geometry_msgs/msg/TransformStamped',
-                self.header(self._stamp(logged), parent), child,
+                self.header(self._stamp(logged if stamp is None else stamp), parent), child,
                 self.new('geometry_msgs/msg/Transform', self.vector(x, y), turn)))
         self.add(topic, kind, logged, self.new(kind, made))
 

@@ -1,0 +1,123 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Bags whose streams were stamped by clocks that disagree, or by one that ran back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from lg_husky_sim.recording import read_recording, Recording
+import numpy as np
+import pytest
+
+FRONT_REAR = ('front_left_wheel', 'front_right_wheel', 'rear_left_wheel', 'rear_right_wheel')
+
+
+def _apart(recording: Recording, name: str) -> float:
+    """Return how far a stream is ahead of the wheels, when both were logged alike [s]."""
+    return float(np.median(recording.stream(name).times - recording.stream('wheels').times))
+
+
+def _said(recording: Recording) -> str:
+    return ' '.join(recording.notes)
+
+
+@pytest.mark.parametrize('stamped', [True, False])
+def test_a_simulator_that_is_reset_leaves_log_times(
+    stamped: bool, bag: Any, tmp_path: Path,
+) -> None:
+    times = 0.1 * np.arange(1, 601)
+    for t in times:
+        stamp = t if t < 30.0 else t - 29.95
+        bag.twist(t, 0.01 * t, 0.0, stamp=stamp if stamped else None)
+        bag.joints(t, FRONT_REAR, [t] * 4, stamp=stamp)
+        bag.imu(t, t, stamp=stamp)
+    recording = read_recording(bag.write(tmp_path / 'bag'))
+    for series in recording.streams.values():
+        np.testing.assert_allclose(series.times, times - 0.1, atol=1e-9)
+        assert np.all(np.diff(series.values[:, 0]) > 0.0)
+    assert 'imu: header time runs back by 29.9 s: log times taken for it' in _said(recording)
+
+
+def test_a_few_messages_that_come_late_are_no_reset(bag: Any, tmp_path: Path) -> None:
+    for k in range(100):
+        t = 1.0 + 0.1 * k
+        # Messages of 3.0 s to 6.0 s are held up and come within the next 0.1 s.
+        bag.imu(6.0 + 0.001 * k if 3.0 <= t < 6.0 else t, t, stamp=t)
+        bag.joints(t, FRONT_REAR, [t] * 4)
+    recording = read_recording(bag.write(tmp_path / 'bag'))
+    np.testing.assert_allclose(recording.stream('imu').times, 0.1 * np.arange(100), atol=1e-9)
+    assert 'runs back' not in _said(recording)
+
+
+def test_commands_on_the_wall_clock_and_sensors_in_slow_simulated_time(
+    bag: Any, tmp_path: Path,
+) -> None:
+    times = 0.1 * np.arange(600)
+    for t in 1.0 + times:
+        bag.twist(t, 0.1, 0.0, stamp=t)
+        bag.joints(t, FRONT_REAR, [1.0] * 4, stamp=0.8 * t - 1e6)
+        bag.imu(t, 0.0, stamp=0.8 * t - 1e6)
+    recording = read_recording(bag.write(tmp_path / 'bag'))
+    for series in recording.streams.values():
+        np.testing.assert_allclose(series.times, times, atol=1e-9)
+    assert 'drift by' in _said(recording)
+    assert 'log times taken throughout' in _said(recording)
+
+
+def test_slow_simulated_time_of_all_streams_is_kept(bag: Any, tmp_path: Path) -> None:
+    for t in 1.0 + 0.1 * np.arange(600):
+        bag.twist(t, 0.1, 0.0, stamp=0.8 * t)
+        bag.joints(t, FRONT_REAR, [1.0] * 4, stamp=0.8 * t)
+    recording = read_recording(bag.write(tmp_path / 'bag'))
+    for series in recording.streams.values():
+        np.testing.assert_allclose(series.times, 0.08 * np.arange(600), atol=1e-8)
+    assert recording.notes == ()
+
+
+def test_an_offset_between_two_stamped_streams_is_not_shared_out(
+    bag: Any, tmp_path: Path,
+) -> None:
+    for t in 1.0 + 0.1 * np.arange(40):
+        bag.twist(t, 0.1, 0.0)
+        bag.joints(t, FRONT_REAR, [1.0] * 4)
+        bag.imu(t, 0.0, stamp=t + 8.0)
+    recording = read_recording(bag.write(tmp_path / 'bag'))
+    for name in ('command', 'imu'):
+        assert _apart(recording, name) == pytest.approx(0.0, abs=1e-6)
+    assert recording.start_ns == 1_700_000_001_000_000_000
+    assert 'imu runs on a clock of its own: shifted by -8.000 s' in _said(recording)
+
+
+@pytest.mark.parametrize(('ahead', 'read'), [
+    (3.0, 0.0), (0.6, 0.0), (0.4, 0.4), (-0.4, -0.4), (-3.0, 0.0)])
+def test_commands_stamped_by_a_laptop(
+    ahead: float, read: float, bag: Any, tmp_path: Path,
+) -> None:
+    for t in 10.0 + 0.1 * np.arange(40):
+        bag.twist(t, 0.1, 0.0, stamp=t + ahead)
+        bag.joints(t, FRONT_REAR, [1.0] * 4)
+    recording = read_recording(bag.write(tmp_path / 'bag'))
+    assert _apart(recording, 'command') == pytest.approx(read, abs=1e-6)
+    assert ('command runs on a clock of its own' in _said(recording)) == (read == 0.0)
+
+
+def test_a_pose_that_takes_long_to_compute_keeps_its_stamps(bag: Any, tmp_path: Path) -> None:
+    for k in range(100):
+        t = 10.0 + 0.1 * k
+        bag.joints(t, FRONT_REAR, [1.0] * 4)
+        bag.transforms(t, [('odom', 'base_link', 0.0, 0.0, 0.0)], stamp=t - 0.6 - 0.01 * k)
+    recording = read_recording(bag.write(tmp_path / 'bag'))
+    assert _apart(recording, 'pose') == pytest.approx(-0.49 - 0.6, abs=0.1)
+    assert 'odom>base_link is stamped 1.095 s earlier than wheels' in _said(recording)
+
+
+def test_without_log_times_small_offsets_are_no_clocks(bag: Any, tmp_path: Path) -> None:
+    for t in 1.0 + 0.1 * np.arange(100):
+        bag.joints(50.0, FRONT_REAR, [1.0] * 4, stamp=t)
+        if t > 5.0:
+            bag.twist(50.0, 0.1, 0.0, stamp=t)
+    recording = read_recording(bag.write(tmp_path / 'bag'))
+    assert recording.stream('command').times[-1] == recording.stream('wheels').times[-1]
+    assert recording.notes == ()
