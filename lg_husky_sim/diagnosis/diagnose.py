@@ -51,12 +51,15 @@ class Case:
     segments : tuple of Segment
     nominal : ModelFile
         That was in doubt.
+    fit : Fit
+        Of the diagnosis' model to all observations.
     """
 
     diagnosis: Diagnosis
     search: Search
     segments: tuple[Segment, ...]
     nominal: ModelFile
+    fit: Fit
 
 
 def usable_segments(recordings: Sequence[Recording]) -> tuple[Segment, ...]:
@@ -153,13 +156,13 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     found = replace(found, final=ordered(found.final, whole.recordings))
     progress('numbers', 0.9)
     own = tuple(s for s in parts if s.recording in names)
-    said = _diagnosis(found, own, nominal, whole)
+    said, fit = _diagnosis(found, own, nominal, whole)
     said = replace(said, notes=(*said.notes, *_mended((*baseline, *recordings))))
-    return Case(said, found, own, nominal)
+    return Case(said, found, own, nominal, fit)
 
 
 def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
-               whole: Observations) -> Diagnosis:
+               whole: Observations) -> tuple[Diagnosis, Fit]:
     names = judge.findings(found)
     verdict = Verdict.KNOWN if names else Verdict.NOTHING_MISSING
     unnamed, fit = None, None
@@ -186,10 +189,10 @@ def _diagnosis(found: Search, own: tuple[Segment, ...], nominal: ModelFile,
     return Diagnosis(
         verdict, judge.confidence(found, verdict, unnamed), names,
         judge.indistinguishable(found), listed,
-        judge.recalibration(found, nominal.parameters),
+        judge.recalibration(found, final, nominal.parameters),
         errors(plant_of(found.plain), own), errors(plant_of(final), own),
         plain_out, augmented_out, _remaining(found, final, unnamed), model,
-        model_of(found.plain, 'recalibrated, nothing added'), _notes(found, verdict))
+        model_of(found.plain, 'recalibrated, nothing added'), _notes(found, verdict)), final
 
 
 def _without_name(found: Search, whole: Observations, unnamed: Unnamed

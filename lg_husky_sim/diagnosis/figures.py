@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 from lg_husky_sim.comparison.figures import COLOURS, MEASURED, STYLE
 from lg_husky_sim.diagnosis.diagnose import Case
 from lg_husky_sim.diagnosis.everyday import named_rounds
-from lg_husky_sim.diagnosis.fits import extras_of
 from lg_husky_sim.diagnosis.locate import Located
 from lg_husky_sim.diagnosis.result import Estimate, Verdict
 from lg_husky_sim.diagnosis.rounds import Round
-from lg_husky_sim.husky.model import compile_model, Structure
+from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.identification.problem import Observations, Slice, UNITS
 from lg_husky_sim.linear_graph import Branch, LinearGraph
 from lg_husky_sim.signals import FloatArray
@@ -33,15 +32,6 @@ CHANNEL_WORDS = {
     'turn': 'yaw rate (pose)'}
 #: Longest stretch that is shown of a signal [s].
 VIEW = 30.0
-
-
-def prediction(case: Case) -> FloatArray:
-    """Return what the model with the finding predicts of the measurements, (n_values,)."""
-    search, model = case.search, case.diagnosis.model
-    if model.structure == search.final.structure:
-        return search.final.solution.predicted
-    plant = compile_model(model.structure).at(model.parameters)
-    return search.observations.predict(plant, extras_of(search.final))
 
 
 def telling_slice(case: Case, final: FloatArray, located: Located) -> Slice:
@@ -102,7 +92,7 @@ def before_after_figure(case: Case, located: Located) -> Figure:
     from matplotlib.figure import Figure
 
     search, observations = case.search, case.search.observations
-    predicted = prediction(case)
+    predicted = case.fit.solution.predicted
     one = telling_slice(case, predicted, located)
     part = slice(one.first, one.last)
     times, measured = observations.times[part], observations.measured[part]
@@ -133,7 +123,7 @@ def before_after_figure(case: Case, located: Located) -> Figure:
         words = CHANNEL_WORDS[one.channel]
         name = observations.pieces[one.piece].recording
         upper.set_title(f'{words[0].upper()}{words[1:]}, {_short(name)}')
-        onset = case.search.final.structure.onset
+        onset = case.diagnosis.model.structure.onset
         if onset is not None and onset.kind.value == 'time' and (
                 onset.recording in ('', name)) and start < onset.value < end:
             for axes in (upper, lower):

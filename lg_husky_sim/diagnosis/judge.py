@@ -13,6 +13,7 @@ from lg_husky_sim.diagnosis.doubts import belief, further_gain, reading_gain
 from lg_husky_sim.diagnosis.events import energy_in_moments, what_happens
 from lg_husky_sim.diagnosis.everyday import most_tried, named_rounds, open_rounds
 from lg_husky_sim.diagnosis.evidence import folds_of, held_out_cost
+from lg_husky_sim.diagnosis.fits import Fit
 from lg_husky_sim.diagnosis.misfit import against_before, beyond_chance, is_far, trust
 from lg_husky_sim.diagnosis.regimes import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
@@ -244,11 +245,10 @@ def confidence(search: Search, verdict: Verdict, unnamed: Unnamed | None = None)
     return name_confidence(gains) * belief(strongest, first.share, remaining) * trust(search)
 
 
-def recalibration(search: Search, nominal: Parameters) -> tuple[Estimate, ...]:
-    """Return the nominal parameters as the final fit has them, with intervals."""
-    names = [u.name for u in search.final.solution.unknowns
-             if not u.extra and u.name in nominal]
-    return estimates(search.observations, search.final, search.rounds[-1].metric, names)
+def recalibration(search: Search, fit: Fit, nominal: Parameters) -> tuple[Estimate, ...]:
+    """Return the nominal parameters as the reported fit has them, with intervals."""
+    names = [u.name for u in fit.solution.unknowns if not u.extra and u.name in nominal]
+    return estimates(search.observations, fit, search.rounds[-1].metric, names)
 
 
 def moved(numbers: Sequence[Estimate], nominal: Mapping[str, float]) -> tuple[Estimate, ...]:

@@ -78,11 +78,10 @@ def no_ground_reaction(search: Search) -> Finding:
     -------
     Finding
     """
-    first = search.rounds[0]
-    gain = max((r.held_out for r in first.rivals), default=0.0)
     return Finding(
         'unknown', 'both', 'traction', ('B_FL', 'B_RL', 'B_FR', 'B_RR', 'M_H', 'J_H'),
-        'whenever the wheels turn', None, (), gain, math.nan, 0.0, rivals_of(first, None),
+        'whenever the wheels turn', None, (), 0.0, math.nan, 0.0,
+        rivals_of(search.rounds[0], None),
         'There is no ground reaction: the wheels turn as commanded and the robot stays where it '
         'is. The wheels are off the ground, or the pose is not that of this robot.')
 
@@ -133,7 +132,7 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
         if first.adopted:
             words += (f' The nearest entry, {first.rivals[0].effect.id}, leaves too much to be '
                       'its name.')
-        gain = best.held_out
+        gain, share = best.held_out, unnamed.share
     elif seen and (near is None or near.held_out < DESCRIBED):
         return Finding('unknown', 'none', place_of(seen).value, elements_of(seen), NOW_AND_THEN,
                        None, (), 0.0, math.nan, 0.0, rivals, f'{NOTHING_NEAR} {event_words(seen)}'
@@ -145,11 +144,12 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
     else:
         effect = near.effect if near is not None else first.scores[0].signature.candidate.effect
         kind = effect.kind
-        gain = near.held_out if near is not None else first.scores[0].gain
+        # What screening promised, and no refit kept, is no gain on held-out data.
+        gain, share = math.nan if near is None else near.held_out, max(first.share, 0.0)
         doubt = ('leaves too much to be its name' if first.adopted else 'that not steadily '
                  'enough over held-out stretches to be its name')
         words = (f'Something is missing that is not in the catalogue; the nearest entry, '
-                 f'{effect.id}, explains {100.0 * max(first.share, 0.0):.1f} % of it, and '
+                 f'{effect.id}, explains {100.0 * share:.1f} % of it, and '
                  f'{doubt}.')
     place, elements, regime = kind.subsystem, kind.elements, 'not determined'
     if seen:
@@ -157,6 +157,6 @@ def unnamed_finding(search: Search, unnamed: Unnamed) -> tuple[Finding, Descript
         words += f' {event_words(seen)}'
     elif is_far(search):
         words += f' {distance_words(search)}'
-    return Finding('unknown', 'none', place.value, elements, regime, None, (), gain,
-                   p_value(gain, 9, len(candidates())), unnamed.share, rivals,
-                   words), best if described else None
+    chance = math.nan if math.isnan(gain) else p_value(gain, 9, len(candidates()))
+    return Finding('unknown', 'none', place.value, elements, regime, None, (), gain, chance,
+                   share, rivals, words), best if described else None

@@ -22,7 +22,6 @@ from lg_husky_sim.diagnosis.figures import (
     intervals_figure,
     labels_of,
     new_elements,
-    prediction,
     rivals_figure,
 )
 from lg_husky_sim.diagnosis.figures_where import effort_figure, where_figure
@@ -101,8 +100,7 @@ def _pictures(case: Case, located: Located) -> dict[str, Picture]:
     diagnosis = case.diagnosis
     structure = diagnosis.model.structure
     culprits = {f.subsystem for f in diagnosis.findings}
-    named = ' and '.join(f.effect.replace('_', ' ') for f in diagnosis.findings).replace(
-        'unknown', 'the description')
+    with_it = labels_of(case)[1].replace('_', ' ')
     found: dict[str, Picture] = {}
 
     def keep(key: str, figure: Figure | None, caption: str) -> None:
@@ -111,7 +109,7 @@ def _pictures(case: Case, located: Located) -> dict[str, Picture]:
 
     keep('before_after', before_after_figure(case, located),
          'The channel in which it shows most: measured, as the recalibrated model has it'
-         + (f', and with {named}.' if labels_of(case)[1] != labels_of(case)[0] else '.')
+         + (f', and {with_it}.' if labels_of(case)[1] != labels_of(case)[0] else '.')
          + ' Below, what is left.')
     keep('where', where_figure(located, culprits, structure.onset),
          'How much of what the recalibrated model leaves a missing effort in each part of the '
@@ -256,7 +254,7 @@ def page(case: Case, located: Located, pictures: Mapping[str, Picture], headline
         trim_blocks=True, lstrip_blocks=True)
     diagnosis, search = case.diagnosis, case.search
     per_channel = channel_rows(search.observations, search.plain.solution.predicted,
-                               prediction(case))
+                               case.fit.solution.predicted)
     return environment.get_template('report.html.j2').render(
         title='Diagnosis of ' + ', '.join(dict.fromkeys(s.recording for s in case.segments)),
         verdict=diagnosis.verdict.value, verdict_words=_WORDS[diagnosis.verdict],
