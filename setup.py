@@ -33,7 +33,8 @@ EXTRAS = {
 EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report', 'search')
                  for need in EXTRAS[extra]]
 EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale']]
-EXTRAS['test'] = ['hypothesis>=6.100', 'pytest>=8', 'pytest-xdist>=3.5', 'setuptools>=70.1']
+EXTRAS['test'] = ['hypothesis>=6.100', 'pytest>=8', 'pytest-rerunfailures>=16.7',
+                  'pytest-xdist>=3.5', 'setuptools>=70.1']
 EXTRAS['dev'] = [
     *EXTRAS['test'],
     # Linters are held at one version each: a newer one may find what was fine yesterday.

@@ -28,6 +28,16 @@ from lg_husky_sim.ros.twin import RunningError, Shadow, Twin  # noqa: E402, I100
 from lg_husky_sim.testing.live import probed_domain  # noqa: E402
 
 
+def turning_robot() -> tuple[Shadow, Shadow]:
+    """Return a robot that begins to turn at 0 s, and a model of it that has heard nothing."""
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    robot = Shadow(plant)
+    robot.wheels(0.0, 0.0, 0.0)
+    robot.command(0.0, BodyTwist(0.5, 0.3))
+    return robot, Shadow(plant)
+
+
 def test_running_error_forgets_and_the_overall_one_does_not() -> None:
     error = RunningError(memory=1.0)
     error.add(0.0, 3.0)
@@ -38,12 +48,9 @@ def test_running_error_forgets_and_the_overall_one_does_not() -> None:
 
 
 def test_shadow_of_the_robot_itself_has_no_error() -> None:
-    model = load_model()
-    plant = compile_model(model.structure).at(model.parameters)
-    robot, shadow = Shadow(plant), Shadow(plant)
-    for one in (robot, shadow):
-        one.wheels(0.0, 0.0, 0.0)
-        one.command(0.0, BodyTwist(0.5, 0.3))
+    robot, shadow = turning_robot()
+    shadow.wheels(0.0, 0.0, 0.0)
+    shadow.command(0.0, BodyTwist(0.5, 0.3))
     for step in range(1, 200):
         moment = 0.01 * step + 1e-6
         robot._advance(moment)
@@ -57,11 +64,7 @@ def test_shadow_of_the_robot_itself_has_no_error() -> None:
 
 def test_joining_a_robot_in_motion_and_after_a_pause() -> None:
     """It rolls already; and after a pause the models begin anew, whatever is heard first."""
-    model = load_model()
-    plant = compile_model(model.structure).at(model.parameters)
-    robot, shadow = Shadow(plant), Shadow(plant)
-    robot.wheels(0.0, 0.0, 0.0)
-    robot.command(0.0, BodyTwist(0.5, 0.3))
+    robot, shadow = turning_robot()
     for step in range(1, 900):
         moment = 0.01 * step + 1e-6
         robot._advance(moment)

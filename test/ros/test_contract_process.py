@@ -35,21 +35,6 @@ def caught(node: NodeProcess, number: signal.Signals) -> bool:
     return bool(int(mask.split()[1], 16) >> (number - 1) & 1)
 
 
-def test_first_odometry_comes_within_two_seconds(probe: Probe, start: Start) -> None:
-    """From the start of the process to the first odometry, best of two on a busy machine."""
-    odom = probe.listen('nav_msgs/msg/Odometry', '/quick/odom')
-    took = []
-    for _ in range(2):
-        odom.clear()
-        husky = start(odometry_topic='/quick/odom')
-        husky.ready(odom)
-        took.append(time.monotonic() - husky.node.started)
-        assert husky.node.stop() == 0
-        if took[-1] < 2.0:
-            return
-    assert min(took) < 2.0
-
-
 def test_steps_follow_the_first_odometry_at_once_with_nothing_compiled(
         probe: Probe, start: Start, tmp_path: Path) -> None:
     """Compiling the kernel comes before the first odometry, not between it and the second."""
@@ -111,10 +96,13 @@ def test_three_robots_share_a_graph_without_crosstalk(probe: Probe, start: Start
         len(truth[name]) > 3 for name in names))
     message = kind()
     message.twist.linear.x = 0.5
-    for _ in range(10):
+
+    def moved() -> bool:
         command.publish(message)
         probe.spin(0.05)
-    assert truth['green'][-1].pose.pose.position.x > 0.02
+        return bool(truth['green'][-1].pose.pose.position.x > 0.1)
+    assert probe.until(moved)
+    probe.spin(0.2)
     for name in ('red', 'blue'):
         assert all(m.pose.pose.position.x == 0.0 for m in truth[name])
     assert [truth[name][-1].pose.pose.position.y for name in names] == [0.0, 1.0, 2.0]

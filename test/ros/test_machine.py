@@ -1,0 +1,78 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Failures by the clock count when the machine was there, and only then."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+
+from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.testing.machine import MachineWatch
+import pytest
+
+CONFTEST = """
+from lg_husky_sim.testing import machine
+told = {told}
+class Watch(machine.MachineWatch):
+    def disturbed(self, begun, ended):
+        return told.pop(0) if told else ''
+machine.MachineWatch = Watch
+def pytest_configure(config):
+    config.addinivalue_line('markers', 'realtime: by the clock')
+    config.pluginmanager.register(machine.PatientClock(repeats=2, pause=0.0))
+"""
+
+TESTS = """
+import pytest
+runs = []
+@pytest.mark.realtime
+def test_by_the_clock():
+    runs.append(1)
+    assert len(runs) >= {passes_at}
+def test_of_another_kind():
+    assert {other}
+"""
+
+
+@pytest.mark.parametrize(('told', 'passes_at', 'other', 'wanted'), [
+    ([], 1, True, '2 passed'),
+    ([], 2, True, '1 failed, 1 passed'),
+    (['late'], 2, True, '2 passed, 1 rerun'),
+    (['late'], 3, True, '1 failed, 1 passed, 1 rerun'),
+    (['late'] * 3, 9, True, '1 passed, 1 skipped, 2 rerun'),
+    (['late'] * 3, 1, False, '1 failed, 1 passed'),
+])
+def test_failures_on_a_disturbed_machine_are_asked_again(
+        told: list[str], passes_at: int, other: bool, wanted: str, tmp_path: Path) -> None:
+    pytest.importorskip('pytest_rerunfailures')
+    (tmp_path / 'conftest.py').write_text(CONFTEST.format(told=told), encoding='utf-8')
+    (tmp_path / 'test_it.py').write_text(
+        TESTS.format(passes_at=passes_at, other=other), encoding='utf-8')
+    ran = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-rs', '-p', 'no:cacheprovider', '-p', 'no:xdist',
+         '--rootdir', str(tmp_path), str(tmp_path)],
+        capture_output=True, text=True, timeout=120.0, check=False)
+    assert f'= {wanted} in ' in ran.stdout, ran.stdout
+    assert ran.returncode == ('failed' in wanted)
+    assert ('not judged: late when it failed, 3 times' in ran.stdout) == ('skipped' in wanted)
+
+
+@pytest.mark.realtime
+def test_a_standstill_is_noticed_and_belongs_to_its_time() -> None:
+    with MachineWatch(worst=0.25, share=0.5) as watch:
+        time.sleep(0.5)
+        begun = time.monotonic()
+        time.sleep(0.5)
+        calm = time.monotonic()
+        watch._process.send_signal(signal.SIGSTOP)
+        time.sleep(0.6)
+        watch._process.send_signal(signal.SIGCONT)
+        time.sleep(0.3)
+        assert watch.disturbed(begun, calm - 0.05) == ''
+        assert watch.disturbed(begun, time.monotonic()).startswith('a core stood still for 0.')
+    with pytest.raises(SettingsError, match='nobody watches'):
+        watch.disturbed(0.0, 1.0)
