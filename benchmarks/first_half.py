@@ -49,7 +49,8 @@ def main() -> None:
         last = max(float(series.times[-1]) for series in recording.streams.values())
         middle = 0.5 * last
         first, second = part(recording, 0.0, middle), part(recording, middle, last)
-        case = diagnose([first], nominal, lambda text, share: None, workers=Workers(given.jobs))
+        with Workers(given.jobs) as workers:
+            case = diagnose([first], nominal, lambda text, share: None, workers=workers)
         held = segments(second)
         before = errors(plant_of(case.search.plain), held)
         model = case.diagnosis.model

@@ -29,7 +29,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
               help='Kept for reproducible scripts: the search itself draws nothing by chance.')
 @click.option('--jobs', type=click.IntRange(min=1), default=None, metavar='N',
-              help='Threads to use; as many as there are cores by default.')
+              help='Processes to use; as many as there are cores by default.')
 @click.option('--scheduler', default=None, metavar='ADDRESS',
               help='Dask scheduler that takes the work instead (tcp://10.0.0.1:8786); its workers '
                    'need this package.')
@@ -70,10 +70,10 @@ def command(
             bar.n = round(100.0 * share)
             bar.refresh()
 
-        after = [read_recording(path, choice) for path in recordings]
-        before = [read_recording(path, choice) for path in baselines]
-        case = diagnose(after, model, progress, before,
-                        Workers(jobs or os.cpu_count() or 1, scheduler))
+        with Workers(jobs or os.cpu_count() or 1, scheduler) as workers:
+            after = [read_recording(path, choice) for path in recordings]
+            before = [read_recording(path, choice) for path in baselines]
+            case = diagnose(after, model, progress, before, workers)
         progress('report and pictures' if with_report else 'files', 0.95)
         try:
             with result_folder(out, MARKER) as folder:

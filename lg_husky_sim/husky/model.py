@@ -18,7 +18,7 @@ from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet, SensorModel
 from lg_husky_sim.husky.speed_loop import close_speed_loop
 from lg_husky_sim.husky.speed_loop import STATES as LOOP_STATES
-from lg_husky_sim.linear_graph import compile_numeric, NumericModel, StateSpace
+from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, NumericModel, StateSpace
 from lg_husky_sim.linear_graph.expressions import compile_tuple, GLOBALS
 import numpy as np
 
@@ -114,6 +114,12 @@ class Structure:
         return tuple(e for e in there if e.again or (e.id, e.side) not in changed)
 
 
+@lru_cache(maxsize=256)
+def _numeric(graph: LinearGraph, outputs: tuple[str, ...]) -> NumericModel:
+    # Effects on commands and sensors leave the graph as it is: half of the catalogue.
+    return compile_numeric(graph, outputs)
+
+
 def _outputs(edited: EditedNetwork) -> tuple[str, ...]:
     names = {branch.name for branch in edited.graph.branches}
     left, right = ('J_LW', 'J_RW') if 'J_LW' in names else ('J_RL', 'J_RR')
@@ -126,7 +132,7 @@ class _Regime:
     def __init__(self, edited: EditedNetwork, renamed: Mapping[str, str]) -> None:
         self.edited = edited
         self._renamed = dict(renamed)
-        self.numeric: NumericModel = compile_numeric(edited.graph, _outputs(edited))
+        self.numeric: NumericModel = _numeric(edited.graph, _outputs(edited))
         rows = [edited.laws[name] for name in self.numeric.efforts]
         self._laws = np.array([int(row.law) for row in rows], dtype=np.int64)
         self._places = [(j, i) for j, row in enumerate(rows) for i in range(len(row.coefficients))]

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import itertools
 import math
+from typing import TypeVar
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import OnsetKind
@@ -25,6 +26,7 @@ PANELS = (0.0, 0.0005, 0.0015, 0.004, 0.01, 0.025, 0.06, 0.15, 0.4, 1.0)
 POINTS = 4
 #: Longest sub-step of a plant with efforts [s].
 LONGEST = 0.01
+_Numbers = TypeVar('_Numbers', NDArray[np.float64], NDArray[np.int64])
 _ONSETS = {OnsetKind.TIME: 1.0, OnsetKind.PLACE_ABOVE: 2.0, OnsetKind.PLACE_BELOW: 3.0}
 
 
@@ -132,11 +134,12 @@ def _stage(command: CommandStage, period: float) -> list[float]:
             command.clamp]
 
 
-def _padded(array: NDArray[np.generic], shape: tuple[int, ...]) -> NDArray[np.generic]:
+def _padded(array: _Numbers, shape: tuple[int, ...], value: int = 0) -> _Numbers:
     if array.shape == shape:
         return array
-    return np.pad(array, [(0, want - have) for want, have in zip(shape, array.shape,
-                                                                 strict=True)])
+    whole: _Numbers = np.full(shape, value, dtype=array.dtype)
+    whole[tuple(slice(have) for have in array.shape)] = array
+    return whole
 
 
 def discretise(plant: Plant, period: float, *, fine_pose: bool = True) -> Operators:
@@ -172,10 +175,10 @@ def discretise(plant: Plant, period: float, *, fine_pose: bool = True) -> Operat
     stacks: list[list[NDArray[np.generic]]] = [[] for _ in range(12)]
     for one in sets:
         a, b, g = _held(one)
-        g = np.pad(g, ((0, 0), (0, efforts - g.shape[1])))
+        g = _padded(g, (n + 4, efforts))
         whole = expm(_block(a, b, g, step) * step)[:size]
         # What pads a set reads no argument: there may be none in the whole plant.
-        laws = np.pad(one.laws, (0, efforts - one.laws.size), constant_values=int(Law.HEADING))
+        laws = _padded(one.laws, (efforts,), int(Law.HEADING))
         coefficients = np.array(_padded(one.coefficients, (efforts, WIDTH)))
         pieces: list[NDArray[np.generic]] = [
             np.array(_stage(one.command, period)),
@@ -185,7 +188,7 @@ def discretise(plant: Plant, period: float, *, fine_pose: bool = True) -> Operat
             np.ascontiguousarray(whole[:, size + 2 + efforts:].T),
             np.ascontiguousarray(_padded(one.h, (arguments, n)).T),
             np.ascontiguousarray(_padded(one.k, (arguments, 2)).T),
-            laws, coefficients, np.pad(one.offsets, (0, efforts - one.offsets.size)),
+            laws, coefficients, _padded(one.offsets, (efforts,)),
             np.ascontiguousarray(one.rows.T),
             np.ascontiguousarray(one.rows_u.T),
         ]
@@ -197,7 +200,7 @@ def discretise(plant: Plant, period: float, *, fine_pose: bool = True) -> Operat
     if fine_pose:
         for index, one in enumerate(sets):
             a, b, g = _held(one)
-            g = np.pad(g, ((0, 0), (0, efforts - g.shape[1])))
+            g = _padded(g, (n + 4, efforts))
             nodes[index] = _nodes(one, a, b, g, step, times)
     onset = np.zeros(2)
     if plant.onset is not None and len(sets) > 1:
