@@ -18,6 +18,8 @@ CONFTEST = """
 from lg_husky_sim.testing import machine
 told = {told}
 class Watch(machine.MachineWatch):
+    def watches(self):
+        return {watches}
     def disturbed(self, begun, ended):
         return told.pop(0) if told else ''
 machine.MachineWatch = Watch
@@ -38,18 +40,19 @@ def test_of_another_kind():
 """
 
 
-@pytest.mark.parametrize(('told', 'passes_at', 'other', 'wanted'), [
-    ([], 1, True, '2 passed'),
-    ([], 2, True, '1 failed, 1 passed'),
-    (['late'], 2, True, '2 passed, 1 rerun'),
-    (['late'], 3, True, '1 failed, 1 passed, 1 rerun'),
-    (['late'] * 3, 9, True, '1 passed, 1 skipped, 2 rerun'),
-    (['late'] * 3, 1, False, '1 failed, 1 passed'),
+@pytest.mark.parametrize(('told', 'passes_at', 'other', 'watches', 'wanted'), [
+    (['late'], 2, True, True, '2 passed, 1 rerun'),
+    (['late'], 3, True, True, '1 failed, 1 passed, 1 rerun'),
+    (['late'], 2, True, False, '1 failed, 1 passed'),
+    (['late'] * 3, 9, True, True, '1 passed, 1 skipped, 2 rerun'),
+    (['late'] * 3, 1, False, True, '1 failed, 1 passed'),
 ])
 def test_failures_on_a_disturbed_machine_are_asked_again(
-        told: list[str], passes_at: int, other: bool, wanted: str, tmp_path: Path) -> None:
+        told: list[str], passes_at: int, other: bool, watches: bool, wanted: str, tmp_path: Path
+) -> None:
     pytest.importorskip('pytest_rerunfailures')
-    (tmp_path / 'conftest.py').write_text(CONFTEST.format(told=told), encoding='utf-8')
+    (tmp_path / 'conftest.py').write_text(
+        CONFTEST.format(told=told, watches=watches), encoding='utf-8')
     (tmp_path / 'test_it.py').write_text(
         TESTS.format(passes_at=passes_at, other=other), encoding='utf-8')
     ran = subprocess.run(
@@ -63,7 +66,7 @@ def test_failures_on_a_disturbed_machine_are_asked_again(
 
 @pytest.mark.realtime
 def test_a_standstill_is_noticed_and_belongs_to_its_time() -> None:
-    with MachineWatch(worst=0.25, share=0.5) as watch:
+    with MachineWatch(worst=0.4, share=9.0) as watch:
         time.sleep(0.5)
         begun = time.monotonic()
         time.sleep(0.5)
@@ -73,6 +76,10 @@ def test_a_standstill_is_noticed_and_belongs_to_its_time() -> None:
         watch._process.send_signal(signal.SIGCONT)
         time.sleep(0.3)
         assert watch.disturbed(begun, calm - 0.05) == ''
+        assert watch.disturbed(begun, time.monotonic()).startswith('a core stood still for 0.')
+        # The one who writes goes on where he was, however often it is read.
+        for _ in range(3000):
+            watch.disturbed(begun, calm)
         assert watch.disturbed(begun, time.monotonic()).startswith('a core stood still for 0.')
     with pytest.raises(SettingsError, match='nobody watches'):
         watch.disturbed(0.0, 1.0)
