@@ -47,7 +47,9 @@ def test_words_go_where_they_belong(line: str, recordings: str, baseline: str, s
                                               str(report)))
 
 
-@pytest.mark.parametrize('line', ['--baseline x y a --out o', '--out o --baseline x y a b'])
+@pytest.mark.parametrize('line', [
+    '--baseline x y a --out o', '--out o --baseline x y a b',
+    '--baseline x y --baseline z a', '--baseline x y --out o --baseline z a b'])
 def test_words_that_may_belong_to_either_are_refused(line: str) -> None:
     result = CliRunner().invoke(_echo, line.split())
     assert result.exit_code != 0

@@ -24,7 +24,8 @@ class SeveralWords(click.Command):
     It is those with a ``…`` in their metavar. If there is a ``=`` in it, too, they go on as long
     as words look like settings; the others up to the next option, unless nothing would be left
     for the arguments that the command needs: then one word belongs to each flag. One flag before
-    three words or more is refused, since nobody knows where its own end.
+    three words or more is refused, since nobody knows where its own end; so are several of which
+    another than the last has more than one.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -34,7 +35,8 @@ class SeveralWords(click.Command):
         if needed is not None and not arguments:
             alone, arguments = self._spelt_out(args, False)
             flags = [word for word in alone if self._goes_on(word)]
-            if arguments > 1 and len(flags) == 1:
+            if flags and arguments > 1 and (
+                    len(flags) == 1 or self._after_each(args) != [1] * (len(flags) - 1)):
                 raise click.UsageError(
                     f'all words follow {flags[0]}, which takes several: put '
                     f'{needed.metavar or needed.name} before it, or behind --', ctx)
@@ -45,6 +47,18 @@ class SeveralWords(click.Command):
         # Whether it is a flag that takes whatever words follow.
         return any('…' in (shown := one.metavar or '') and '=' not in shown
                    for one in self.params if isinstance(one, click.Option) and word in one.opts)
+
+    def _after_each(self, args: list[str]) -> list[int]:
+        # How many words follow each of such flags but the last.
+        counts: list[int] = []
+        open_ = False
+        for word in args:
+            if word.startswith('-'):
+                open_ = self._goes_on(word)
+                counts += [0] * open_
+            elif open_:
+                counts[-1] += 1
+        return counts[:-1]
 
     def _spelt_out(self, args: list[str], greedy: bool) -> tuple[list[str], int]:
         # The words with a flag before each value, and how many belong to no option.

@@ -69,6 +69,18 @@ class RecordingOutcome:
             return math.nan, math.nan
         return max(pair[0] for pair in known), max(pair[1] for pair in known)
 
+    def gaps(self) -> list[str]:
+        """Return a sentence for each model or rival whose errors are over a part of the drive."""
+        counts = {name: {channel: one.count for channel, one in self.errors(name).items()}
+                  for name in labels([self])}
+        most = {channel: max(count.get(channel, 0) for count in counts.values())
+                for count in counts.values() for channel in count}
+        shares = {name: min((n / most[channel] for channel, n in count.items() if most[channel]),
+                            default=1.0) for name, count in counts.items()}
+        # A sample or two at the ends is no part of a drive.
+        return [f'the errors of {name} are over a part of the drive, down to {share:.0%} of the '
+                'samples of the others' for name, share in shares.items() if share < 0.99]
+
 
 def compare_recording(
     recording: Recording, plants: Sequence[NamedPlant], rival: tuple[str, Recording] | None = None,
@@ -178,6 +190,7 @@ def text_table(outcomes: Sequence[RecordingOutcome]) -> str:
             for place, axis in enumerate(('|X| [m]', '|Y| [m]')):
                 cells = ''.join(f'{_number(bounds[name][place]):>{width}}' for name in names)
                 lines.append(f'  {axis:<28}{cells}')
+        lines += [f'  {gap}' for gap in outcome.gaps()]
         lines.append('')
     return '\n'.join(lines)
 
@@ -203,8 +216,10 @@ def as_json(
         'recordings': [{
             'name': outcome.recording.name,
             'path': printable(outcome.recording.path),
-            'notes': list(outcome.recording.notes),
+            'notes': [*outcome.recording.notes, *outcome.gaps()],
             'results': {name: {'rmse': _rmse(outcome.errors(name)),
+                               'samples': {channel: one.count for channel, one
+                                           in outcome.errors(name).items()},
                                'bounds_m': _bounds(outcome.bounds(name))} for name in names},
             'segments': [{
                 'index': index, 'start_s': part.segment.start, 'end_s': part.segment.end,

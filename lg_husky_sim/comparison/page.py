@@ -148,7 +148,7 @@ def _page(
         'seconds': sum(part.segment.duration for part in outcome.segments),
         'segments': len(outcome.segments),
         'rows': _rows(outcome, names),
-        'notes': outcome.recording.notes,
+        'notes': (*outcome.recording.notes, *outcome.gaps()),
         'pictures': [{'data': b64encode(picture.path.read_bytes()).decode('ascii'),
                       'alt': picture.alt} for picture in made],
         'left_out': max(0, len(outcome.segments) - most),

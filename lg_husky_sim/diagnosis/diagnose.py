@@ -29,6 +29,7 @@ from lg_husky_sim.diagnosis.result import Diagnosis, Finding, Verdict
 from lg_husky_sim.diagnosis.search import MOST, Progress, Search, search
 from lg_husky_sim.diagnosis.unnamed import described, look_for_unnamed, Unnamed
 from lg_husky_sim.diagnosis.workers import HERE, Workers
+from lg_husky_sim.husky.effects import descriptions
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.identification.problem import Observations, observations
@@ -245,6 +246,9 @@ def _remaining(found: Search, final: Fit, unnamed: Unnamed | None) -> str:
 def _notes(found: Search, verdict: Verdict) -> tuple[str, ...]:
     bound = found.final.solution.at_bound
     notes = []
+    if any(effect.id in descriptions() for effect in found.plain.structure.effects):
+        notes.append('the model has a smooth effort of an earlier diagnosis: no other one was '
+                     'looked for beside it')
     if everyday_words(found) and verdict is not Verdict.UNKNOWN:
         notes.append('in the model, and too little to be called missing from it: '
                      + everyday_words(found))

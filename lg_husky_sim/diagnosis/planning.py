@@ -18,7 +18,7 @@ from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.candidates import changed_candidates, effect_entries
 from lg_husky_sim.diagnosis.fits import fit_structure
 from lg_husky_sim.errors import DiagnosisError, LgHuskyError
-from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.effects import check_distinct, Effect
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.noise import Metric
@@ -116,6 +116,7 @@ def typical(name: str, structure: Structure, parameters: Parameters, side: str =
     middle = starts[len(starts) // 2]
     entries = effect_entries(effect, middle)
     whole = structure.with_effect(effect)
+    check_distinct(whole.effects)
     compile_model(whole)
     ordered = (middle, *(s for s in starts if s is not middle))
     return Rival(name, whole, parameters.with_entries(*entries), ordered[:STARTS])

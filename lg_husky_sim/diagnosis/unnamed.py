@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import itertools
 import math
 
-from lg_husky_sim.diagnosis.candidates import Candidate
+from lg_husky_sim.diagnosis.candidates import Candidate, still_open
 from lg_husky_sim.diagnosis.evidence import FOLDS, folds_of, held_out_cost
 from lg_husky_sim.diagnosis.fits import extras_of, Fit, fit_structure, shared_metric
 from lg_husky_sim.diagnosis.screening import Projector, Signature, signatures_of
@@ -128,18 +128,18 @@ def description_signatures(observations: Observations, structure: Structure,
     Returns
     -------
     list of Signature
+        None where the model has a description already: all have the same knots.
     """
     spans = ranges(observations, plant)
-    found = []
+    pool = []
     for name, kind in descriptions().items():
         for side, shape in itertools.product(kind.sides, kind.shapes):
             low, high = spans[shape]
             start = dict.fromkeys(KNOTS, _SIZE[name])
-            candidate = Candidate(Effect(name, side, shape),
-                                  ({**start, 'range_low': low, 'range_high': high},), True)
-            found.extend(signatures_of(candidate, structure, parameters, extra, observations,
-                                       base))
-    return found
+            pool.append(Candidate(Effect(name, side, shape),
+                                  ({**start, 'range_low': low, 'range_high': high},), True))
+    return [signature for candidate in still_open(pool, structure) for signature in signatures_of(
+        candidate, structure, parameters, extra, observations, base)]
 
 
 def describe(observations: Observations, signatures: Sequence[Signature], projector: Projector,

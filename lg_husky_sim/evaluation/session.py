@@ -83,9 +83,9 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None]) -> 
     str
         The tables as text.
     """
+    read, = named_apart([read_recording(path, request.topics) for path in request.steps])
     results = [evaluate_case(case, request.model, request.seed, request.starts, request.jobs,
                              tell) for case in _cases(request)]
-    read, = named_apart([read_recording(path, request.topics) for path in request.steps])
     steps = [evaluate_steps(recording, request.model, request.seed, request.starts, request.jobs,
                             tell=tell) for recording in read]
     texts, sections = [], []

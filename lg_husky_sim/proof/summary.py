@@ -75,7 +75,7 @@ def rates(cases: Sequence[Judgement]) -> tuple[Rate, ...]:
         _rate('medium and strong: subsystem right', clear, lambda c: c.subsystem, 0.92),
         _rate('weak: named right', weak, lambda c: c.top1),
         _rate('weak: named right, nothing or unknown, and no wrong name', weak,
-              lambda c: c.top1 or c.first in ('nothing', 'unknown')),
+              lambda c: not c.extra and (c.top1 or c.first in ('nothing', 'unknown'))),
         _rate('medium and strong, named right: another effect named beside',
               [c for c in clear if c.top1], lambda c: c.extra > 0),
         _rate('clean: named, called unknown or failed (false alarm)', clean,

@@ -230,6 +230,14 @@ def test_a_rival_may_end_early_and_be_called_like_a_model(bag: Path) -> None:
     data = json.loads((bag.parent / 'result' / 'compare.json').read_text())
     assert [list(part['results']) for part in data['recordings'][0]['segments']] == [
         ['paper', 'paper (rival)'], ['paper', 'paper (rival)'], ['paper']]
+    counts = [result['samples'] for result in data['recordings'][0]['results'].values()]
+    share = min(counts[1][channel] / number for channel, number in counts[0].items())
+    assert 0.3 < share < 0.6
+    said = ('the errors of paper (rival) are over a part of the drive, down to '
+            f'{share:.0%} of the samples of the others')
+    assert data['recordings'][0]['notes'] == [said]
+    for name in ('compare.txt', 'index.html'):
+        assert said in (bag.parent / 'result' / name).read_text()
 
 
 @pytest.mark.parametrize('kept', [('wheels',), ('pose',), ('imu',)])

@@ -67,12 +67,11 @@ def driven(name: str, effects: Sizes, seed: int, backwards: bool = False,
     return Recording(name, name, streams, 0, frames=('odom', 'base_link'))
 
 
-def changed(effects: Sizes, since: float | None = None) -> Case:
-    """Return the diagnosis of two recordings against two of the base."""
+def changed(effects: Sizes, since: float | None = None, each: int = 1) -> Case:
+    """Return the diagnosis of one or two recordings against as many of the base."""
     before = [driven('base1', BASE, 1), driven('base2', BASE, 2, backwards=True)]
-    first = driven('rec1', effects if since is None else BASE, 3)
-    after = [first, driven('rec2', effects, 4, backwards=True, since=since)]
-    return diagnose(after, load_model(), lambda text, share: None, before)
+    after = [driven('rec2', effects, 4, backwards=True, since=since), driven('rec1', effects, 3)]
+    return diagnose(after[:each], load_model(), lambda text, share: None, before[:each])
 
 
 @pytest.fixture
@@ -107,7 +106,7 @@ def test_a_new_effect_is_named() -> None:
 @pytest.mark.usefixtures('base_once')
 def test_what_was_there_before_may_change() -> None:
     """The dead time grows: the finding is the dead time, with its new value."""
-    found = changed({**BASE, 'command_latency': {'latency': 0.2}}).diagnosis
+    found = changed({**BASE, 'command_latency': {'latency': 0.2}}, each=2).diagnosis
     (finding,) = found.findings
     assert finding.effect == 'command_latency'
     (number,) = finding.parameters

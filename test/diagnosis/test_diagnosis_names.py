@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from lg_husky_sim.diagnosis.diagnose import Case, diagnose
+from lg_husky_sim.diagnosis.doubts import is_guise
 from lg_husky_sim.diagnosis.locate import fingerprints, locate, subsystem_strengths
 from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.unnamed import look_for_unnamed
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model_file import load_model
@@ -52,6 +54,11 @@ def test_hidden_effect_is_named_with_its_size(
     for name, size in sizes.items():
         assert numbers[name].value == pytest.approx(size, rel=0.12, abs=0.5 * (name == 'slope_y'))
         assert numbers[name].low < size < numbers[name].high
+
+
+def test_what_explains_all_is_no_guise_of_something_else(diagnosed: Callable[[str], Case]) -> None:
+    search = diagnosed('rotation').search
+    assert not is_guise(search, look_for_unnamed(search.observations, search.final))
 
 
 @pytest.mark.parametrize('part', PARTS)

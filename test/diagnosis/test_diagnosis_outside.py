@@ -87,14 +87,21 @@ def test_change_without_a_name_is_described_from_then_on(record: Record) -> None
 def test_name_that_leaves_an_effort_elsewhere_is_a_guise(record: Record) -> None:
     """Scrub that grows with speed is in the catalogue; beside that force it is half the truth."""
     scrub = {Effect('yaw_scrub_speed'): {'scrub_slope': 6.0}}
-    alone = diagnosed(record, scrub)
-    assert [f.effect for f in alone.diagnosis.findings] == ['yaw_scrub_speed']
-    assert not is_guise(alone.search, look_for_unnamed(
-        alone.search.observations, alone.search.final))
     both = diagnosed(record, {**scrub, FORCE: AHEAD})
     assert [r.rivals[0].effect.id for r in both.search.rounds if r.adopted]
     assert both.diagnosis.verdict is Verdict.UNKNOWN
     assert both.diagnosis.model.about == both.diagnosis.findings[0].statement
+
+
+def test_a_second_description_is_not_put_on_the_knots_of_the_first(record: Record) -> None:
+    model = load_model()
+    entries = effect_entries(FORCE, AHEAD)
+    held = replace(model, structure=model.structure.with_effect(FORCE),
+                   parameters=model.parameters.with_entries(*entries))
+    data = observations(segments(record('ahead', plant_with({}), STEPS[:4], 1)))
+    found = look_for_unnamed(data, recalibrate(data, held.structure, held.parameters))
+    assert found.descriptions == ()
+    assert found.share == 0.0
 
 
 def test_smooth_effort_moves_the_recalibration_along(record: Record) -> None:

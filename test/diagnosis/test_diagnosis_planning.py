@@ -10,6 +10,7 @@ from typing import Any
 
 from lg_husky_sim.cli.main import run
 from lg_husky_sim.diagnosis.planning import drives, imitated, named_drive, plan, typical
+from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model, save_model
@@ -89,6 +90,15 @@ def test_an_effect_that_is_there_is_taken_with_other_numbers() -> None:
     assert found.structure.effects[-1].again
     plant = compile_model(found.structure).at(found.parameters)
     assert plant.sets[0].command.latency == found.parameters['latency_later'] != 0.1
+
+
+def test_an_effect_that_shares_a_number_with_another_side_is_refused() -> None:
+    model = load_model()
+    effect = Effect('coulomb_drivetrain', 'left')
+    parameters = model.parameters.with_entries(*(p.parameter() for p in effect.parameters()))
+    for side in ('right', 'both'):
+        with pytest.raises(ParameterError, match='share the parameter dry_torque'):
+            typical('coulomb_drivetrain', model.structure.with_effect(effect), parameters, side)
 
 
 def test_folder_of_two_diagnoses_is_refused(tmp_path: Path, capsys: Any) -> None:

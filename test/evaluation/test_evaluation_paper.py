@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lg_husky_sim.cli.main import run
 from lg_husky_sim.errors import CommandError, SettingsError
-from lg_husky_sim.evaluation import engine
+from lg_husky_sim.evaluation import engine, session
 from lg_husky_sim.evaluation.cases import MANOEUVRES, recorded_case
 from lg_husky_sim.evaluation.engine import drive, engine_config, engine_robot
 from lg_husky_sim.husky.model_file import load_model
@@ -114,6 +114,10 @@ def test_bad_requests_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture
         'nominal': {'mass': 1.0}, 'robot': {}})
     with pytest.raises(SettingsError, match='unknown or missing'):
         engine.engine_robot('nominal')
+    monkeypatch.setattr(session, 'evaluate_case', None)   # what cannot be read is said before
+    assert run(['evaluate', '--case', 'synthetic', '--steps', str(tmp_path / 'none'), '--out',
+                str(tmp_path / 'x')]) == 1
+    assert str(tmp_path / 'none') in capsys.readouterr().err
     occupied = tmp_path / 'full'
     occupied.mkdir()
     (occupied / 'thesis.txt').write_text('mine')

@@ -221,6 +221,16 @@ def test_the_summary_counts() -> None:
     assert result['by_effect']['slope']['named'] == {'slope': 2, 'payload': 1}
 
 
+def test_a_wrong_name_beside_a_weak_effect_s_right_one_is_a_wrong_name() -> None:
+    weak = answer('slope', severity='weak')
+    right, two = (outcome('known', *found) for found in (
+        (finding('slope', 'translation'),),
+        (finding('slope', 'translation'), finding('gyro_bias', 'sensor'))))
+    rates = {rate.name: rate for rate in summary.rates([judge(weak, right), judge(weak, two)])}
+    assert rates['weak: named right'].value == 1.0
+    assert rates['weak: named right, nothing or unknown, and no wrong name'].value == 0.5
+
+
 def test_shares_against_a_baseline_stand_apart() -> None:
     """They count what is known of the base, too: a clean robot has a share there."""
     held = {who: {'all': value, 'position_m': value}
