@@ -20,6 +20,9 @@ from scipy.ndimage import median_filter
 
 IntArray = NDArray[np.int64]
 
+MAIN = ('command', 'wheels', 'imu')
+"""Streams that tell how the robot moves, with the transforms of its pose."""
+
 NEIGHBOURS = 11
 """Messages that a header stamp is held against."""
 OUTLIER_NS = 1_000_000_000
@@ -54,11 +57,12 @@ def common_clock(streams: Mapping[str, Stamps]) -> tuple[dict[str, IntArray], li
     Put all streams on one clock.
 
     Streams with header stamps keep them; zero and outlying ones are filled in from the log time.
-    A stream whose header time runs back far, as after the reset of a simulator, counts as one
-    without headers. One stamped stream is the reference, the wheels where they are, and a
-    stream whose clock runs apart from it is shifted onto it. Streams without headers take the
-    log time, shifted onto the reference's clock where that is another one. If the clocks do not
-    run at one rate (a replay at another speed), all take log times.
+    A stream whose header time runs back far, as after the reset of a simulator, or stands still
+    counts as one without headers. One stamped stream is the reference, the wheels where they
+    are, and a stream whose clock runs apart from it is shifted onto it. Streams without headers
+    take the log time, shifted onto the reference's clock where that is another one. If the
+    clocks of commands, wheels, imu and pose do not run at one rate (a replay at another speed),
+    all take log times; any other stream by itself.
 
     Parameters
     ----------
@@ -80,23 +84,49 @@ def common_clock(streams: Mapping[str, Stamps]) -> tuple[dict[str, IntArray], li
     notes: list[str] = []
     headers = _headers(streams, notes)
     delays = {name: header - streams[name].logged for name, header in headers.items()}
+    aside = _unsteady(streams, delays)
+    delays = {name: delay for name, delay in delays.items() if name not in aside}
     reference = min(delays, key=_trust, default='')
     gaps = {name: _gap(name, reference, streams, delays) for name in delays}
     drift = max((abs(_drift(name, gap)) for name, gap in gaps.items()), default=0)
-    if len(delays) < len(streams):
-        drift = max((drift, *(int(np.ptp(np.quantile(delay, (0.05, 0.95))))
-                              for delay in delays.values())))
+    if any(name not in delays for name in streams if _is_main(name)):  # it has log times
+        drift = max((drift, *(_wander(streams[name], delay)
+                              for name, delay in delays.items() if _is_main(name))))
     if drift > SKEW_NS:
         notes.append(f'header clock and log clock drift by {drift * 1e-9:.1f} s: '
                      'log times taken throughout')
         times = {name: stamps.logged for name, stamps in streams.items()}
     else:
-        common = int(np.median(delays[reference])) if reference else 0
+        notes += [f'{name}: header clock drifts by {apart * 1e-9:.1f} s: log times taken for it'
+                  for name, apart in aside.items()]
         times = {name: headers[name] + _shift(name, reference, gaps[name], notes)
-                 if name in headers else stamps.logged + _onto_headers(name, common, notes)
+                 if name in delays else
+                 stamps.logged + _onto_headers(name, reference, streams, delays, notes)
                  for name, stamps in streams.items()}
     _check_span(times)
     return times, notes
+
+
+def _is_main(name: str) -> bool:
+    """Say whether a robot's motion is in a stream; voltage and currents only go with it."""
+    return name in MAIN or '>' in name
+
+
+def _unsteady(
+    streams: Mapping[str, Stamps], delays: Mapping[str, IntArray],
+) -> dict[str, int]:
+    """
+    Return the streams beside the main ones that drift, and by how much [ns].
+
+    They are held against a main stream, or against log times where none of these is stamped.
+    """
+    anchor = min((name for name in delays if _is_main(name)), key=_trust, default='')
+    if not anchor and len(delays) == len(streams):
+        return {}
+    drifts = {name: abs(_drift(name, _gap(name, anchor, streams, delays))) if anchor
+              else _wander(streams[name], delays[name])
+              for name in delays if not _is_main(name)}
+    return {name: drift for name, drift in drifts.items() if drift > SKEW_NS}
 
 
 def _headers(streams: Mapping[str, Stamps], notes: list[str]) -> dict[str, IntArray]:
@@ -136,6 +166,18 @@ def _trust(name: str) -> int:
     return 4 if '>' in name else ranks.get(name, 2)
 
 
+def _delay_at(logged: IntArray, stamps: Stamps, delay: IntArray) -> IntArray:
+    """Return a stream's header time less log time when another was logged [ns]."""
+    order = np.argsort(stamps.logged, kind='stable')
+    start, usual = stamps.logged[order[0]], int(np.median(delay))
+    # Relative to the start and the median: as they are, floats hold them to 0.3 µs only.
+    apart = np.interp((logged - start).astype(np.float64),
+                      (stamps.logged[order] - start).astype(np.float64),
+                      (delay[order] - usual).astype(np.float64))
+    result: IntArray = usual + np.rint(apart).astype(np.int64)
+    return result
+
+
 def _gap(name: str, reference: str, streams: Mapping[str, Stamps],
          delays: Mapping[str, IntArray]) -> IntArray:
     """
@@ -145,24 +187,41 @@ def _gap(name: str, reference: str, streams: Mapping[str, Stamps],
     nothing logged while the other was), one value, and 0 unless it is very large.
     """
     logged, base = streams[name].logged, streams[reference].logged
-    common = int(np.median(delays[reference]))
     both = (logged >= base.min()) & (logged <= base.max())
     if _frozen(logged) or _frozen(base) or not np.any(both):
-        apart = int(np.median(delays[name])) - common
+        apart = int(np.median(delays[name])) - int(np.median(delays[reference]))
         return np.array([apart if abs(apart) > FOREIGN_NS else 0])
-    order = np.argsort(base, kind='stable')
-    expected = np.interp((logged[both] - base[order[0]]).astype(np.float64),
-                         (base[order] - base[order[0]]).astype(np.float64),
-                         (delays[reference][order] - common).astype(np.float64))
-    gap: IntArray = delays[name][both] - common - np.rint(expected).astype(np.int64)
+    gap: IntArray = delays[name][both] - _delay_at(
+        logged[both], streams[reference], delays[reference])
     return gap
 
 
 def _drift(name: str, gap: IntArray) -> int:
-    """Return by how much a gap grows from its first to its last quarter [ns]."""
-    quarter = max(1, gap.size // 4)
-    first, last = int(np.median(gap[:quarter])), int(np.median(gap[-quarter:]))
-    return 0 if _late(name, min(first, last)) and max(first, last) <= SKEW_NS else last - first
+    """Return by how much a gap grows [ns]; 0 if the stream may just come late."""
+    first, last = _ends(gap, max(1, gap.size // 4))
+    late = _late(name, min(first, last)) and max(first, last) <= SKEW_NS
+    return 0 if late else _growth(gap)
+
+
+def _ends(values: IntArray, count: int) -> tuple[int, int]:
+    return int(np.median(values[:count])), int(np.median(values[-count:]))
+
+
+def _growth(values: IntArray) -> int:
+    """
+    Return by how much delays grow from their start to their end [ns].
+
+    Two clocks that drift stay apart; where a link is congested for a while, messages are logged
+    late, and in time again after it. So the quarters and the very ends both have to tell.
+    """
+    quarter = max(1, values.size // 4)
+    ends = [_ends(values, count) for count in (quarter, min(quarter, NEIGHBOURS))]
+    return min((last - first for first, last in ends), key=abs)
+
+
+def _wander(stamps: Stamps, delay: IntArray) -> int:
+    """Return by how much header and log clock drift apart [ns], 0 if log times do not tell."""
+    return 0 if _frozen(stamps.logged) else abs(_growth(delay))
 
 
 def _late(name: str, apart: int) -> bool:
@@ -182,11 +241,22 @@ def _shift(name: str, reference: str, gap: IntArray, notes: list[str]) -> int:
     return -apart
 
 
-def _onto_headers(name: str, common: int, notes: list[str]) -> int:
+def _onto_headers(name: str, reference: str, streams: Mapping[str, Stamps],
+                  delays: Mapping[str, IntArray], notes: list[str]) -> IntArray | int:
+    """Return what puts log times on the reference's clock [ns], each where the clocks drift."""
+    if not reference:
+        return 0
+    base, delay = streams[reference], delays[reference]
+    if _wander(base, delay) > SKEW_NS:
+        apart = _delay_at(streams[name].logged, base, delay)
+        notes.append(f'{name} has no header stamps of use: log times shifted by '
+                     f'{apart[0] * 1e-9:.3f} to {apart[-1] * 1e-9:.3f} s onto the header clock')
+        return apart
+    common = int(np.median(delay))
     if abs(common) <= SKEW_NS:
         return 0
-    notes.append(f'{name} has no header stamps: log times shifted by {common * 1e-9:.3f} s '
-                 'onto the header clock')
+    notes.append(f'{name} has no header stamps of use: log times shifted by '
+                 f'{common * 1e-9:.3f} s onto the header clock')
     return common
 
 
@@ -201,6 +271,9 @@ def _mended(name: str, stamps: Stamps, notes: list[str]) -> IntArray | None:
     if 2 * np.count_nonzero(there) <= there.size:
         return None
     header, logged = stamps.header.copy(), stamps.logged
+    if np.ptp(header[there]) == 0 and np.ptp(logged) > SKEW_NS:
+        notes.append(f'{name}: header stamps stand still: log times taken for it')
+        return None
     delay = (header - logged)[there]
     usual = np.empty(header.size, dtype=np.int64)
     usual[there] = median_filter(delay, size=min(NEIGHBOURS, delay.size), mode='nearest')

@@ -17,6 +17,7 @@ from lg_husky_sim.recording.clock import Stamps
 from lg_husky_sim.recording.frames import quaternion_heading, whole_frame
 from lg_husky_sim.recording.wheels import (
     named_wheels,
+    passed_over,
     side_means,
     Sides,
     unwrapped_means,
@@ -28,6 +29,8 @@ import numpy as np
 
 WHEEL_COLUMNS = 6
 """Rates, angles and efforts, each left and right."""
+LISTED = 4
+"""Joints that a note lists; a pair of arms has many."""
 
 
 @dataclass
@@ -75,7 +78,12 @@ class Collected:
         return self.rows[name]
 
     def settle(self) -> None:
-        """Mend what only shows in all messages: wheels of one side that wrap one by one."""
+        """Mend and note what only shows in all messages of the wheels."""
+        left_out = passed_over(self.seen) if self.named else []
+        if left_out:
+            more = f' and {len(left_out) - LISTED} more' if len(left_out) > LISTED else ''
+            self.notes.append('wheels: joints not called wheels, or of no side, were passed over: '
+                              + ', '.join(left_out[:LISTED]) + more)
         turned, self.turned = self.turned, None
         means = unwrapped_means(turned) if turned else None
         if means is None:

@@ -28,7 +28,9 @@ from lg_husky_sim.recording.topics import (
     candidates,
     listing,
     ODOMETRY,
+    Robots,
     robots,
+    shared_transforms,
     Topic,
     TopicMap,
     TYPES,
@@ -78,29 +80,30 @@ def read_recording(path: str | PathLike[str], topics: TopicMap | None = None) ->
     chosen = topics or TopicMap()
     with open_bag(place) as bag:
         present = bag.topics()
-        several = robots(present, chosen)
-        found = _collect(bag, present, chosen, several)
+        whose = robots(present, chosen)
+        found = _collect(bag, present, chosen, whose)
     try:
-        return _recording(place, present, found, chosen, several)
+        return _recording(place, present, found, chosen, whose)
     except RecordingError as error:
         raise RecordingError(f'cannot use {place}: {error}') from error
 
 
 def _collect(
-    bag: Bag, present: tuple[Topic, ...], chosen: TopicMap, several: tuple[str, ...],
+    bag: Bag, present: tuple[Topic, ...], chosen: TopicMap, whose: Robots,
 ) -> dict[str, _Found]:
     """Read the likeliest topic of each role; the next one where it gave nothing."""
-    waiting = {role: list(candidates(role, present, getattr(chosen, role), several[1:]))
+    waiting = {role: list(candidates(role, present, getattr(chosen, role), whose))
                for role in TYPES}
     found: dict[str, _Found] = {}
     while any(waiting.values()):
         attempt = {role: topics.pop(0) for role, topics in waiting.items() if topics}
         for role, collected in _read(bag, attempt).items():
-            if _serves(role, collected, chosen, several):
-                found[role] = _Found(attempt[role], collected)
+            entry = _Found(attempt[role], collected)
+            if _serves(role, entry, chosen, whose):
+                found[role] = entry
                 waiting[role] = []
             else:  # kept for the message that nothing serves
-                found.setdefault(role, _Found(attempt[role], collected))
+                found.setdefault(role, entry)
     return found
 
 
@@ -119,44 +122,42 @@ def _read(bag: Bag, attempt: Mapping[str, Topic]) -> dict[str, Collected]:
     return collected
 
 
-def _serves(
-    role: str, collected: Collected, chosen: TopicMap, several: tuple[str, ...],
-) -> bool:
+def _serves(role: str, entry: _Found, chosen: TopicMap, whose: Robots) -> bool:
     if role == 'pose':
-        return bool(_chain(collected, chosen, several)[0])
-    return bool(collected.rows)
+        return bool(_chain(entry, chosen, whose)[0])
+    return bool(entry.collected.rows)
 
 
 def _chain(
-    collected: Collected, chosen: TopicMap, several: tuple[str, ...],
+    entry: _Found, chosen: TopicMap, whose: Robots,
 ) -> tuple[tuple[Edge, ...], dict[Edge, Edge]]:
     """Return the transforms of the pose, and under which names all were recorded."""
-    edges = [(name.split('>')[0], name.split('>')[1]) for name in collected.rows]
+    edges = [(name.split('>')[0], name.split('>')[1]) for name in entry.collected.rows]
     if not (chosen.odom_frame or chosen.base_frame):
-        others = set(several[1:]) - {''}
+        # In a topic of the robot's own, frames without namespace are its own.
+        others = set(whose.others) - (set() if shared_transforms(entry.topic) else {''})
         edges = [edge for edge in edges if frame_space(edge[1]) not in others]
     told = told_apart(edges)
-    robot = several[0] if several else ''
-    return pose_chain(told, chosen.odom_frame, chosen.base_frame, robot), told
+    return pose_chain(told, chosen.odom_frame, chosen.base_frame, whose.home or ''), told
 
 
 def _recording(
     path: Path, present: tuple[Topic, ...], found: Mapping[str, _Found], chosen: TopicMap,
-    several: tuple[str, ...],
+    whose: Robots,
 ) -> Recording:
     notes: list[str] = []
-    if several:
-        notes.append(f'topics of several robots: those of /{several[0]} are read, not those of '
-                     f'/{", /".join(several[1:])}; --topic chooses another')
+    if whose.others:
+        notes.append(f'topics of several robots: those of /{whose.home} are read, not those of '
+                     f'/{", /".join(whose.others)}; --topic chooses another')
     chain: tuple[Edge, ...] = ()
     rows: dict[str, Rows] = {}
     origin: dict[str, str] = {}
     for role, entry in found.items():
         given = entry.collected.rows
         if role == 'pose':
-            chain, told = _chain(entry.collected, chosen, several)
+            chain, told = _chain(entry, chosen, whose)
             given = {edge_name(*edge): given[edge_name(*told[edge])] for edge in chain}
-            notes += _alike(chain, told, chosen)
+            notes += _doubts(entry.topic, chain, told, chosen, whose)
         names = list(given)
         notes += entry.collected.notes
         for name in names:
@@ -165,7 +166,8 @@ def _recording(
                 origin['pose' if role == 'pose' else name] = entry.topic.name
         if not names and role in ('wheels', 'pose'):
             seen = ', '.join(sorted(entry.collected.seen)) or 'nothing'
-            notes.append(f'no {role} in {entry.topic.name}: it holds {seen}')
+            owner = f' of /{whose.home}' if whose.others else ''
+            notes.append(f'no {role}{owner} in {entry.topic.name}: it holds {seen}')
         if role == 'pose' and names and entry.topic.kind == ODOMETRY:
             notes.append(f'pose taken from odometry ({entry.topic.name}): if that is computed '
                          'from the wheels, their slip does not show in it')
@@ -194,18 +196,26 @@ def _recording(
         notes=tuple(notes))
 
 
-def _alike(chain: tuple[Edge, ...], told: Mapping[Edge, Edge], chosen: TopicMap) -> list[str]:
-    """Return a note if other transforms have the plain names of the one taken."""
+def _doubts(
+    topic: Topic, chain: tuple[Edge, ...], told: Mapping[Edge, Edge], chosen: TopicMap,
+    whose: Robots,
+) -> list[str]:
+    """Return notes if the transform taken may be another robot's or others are called alike."""
     if not chain or chosen.odom_frame or chosen.base_frame:
         return []
+    notes: list[str] = []
+    parent, child = told[chain[0]]
+    if whose.others and whose.home and shared_transforms(topic) and not frame_space(child):
+        notes.append(f'{parent} -> {child} in {topic.name} names no robot: taken for that of '
+                     f'/{whose.home}')
     plain = [plain_frame(frame) for frame in chain[0]]
     others = [edge for edge in told if edge != chain[0]
               and [plain_frame(frame) for frame in edge] == plain]
-    if not others:
-        return []
-    words = ', '.join(f'{parent} -> {child}' for parent, child in sorted(others))
-    return [f'several transforms of one name: {chain[0][0]} -> {chain[0][1]} is read, not '
-            f'{words}; --topic odom_frame=NAME chooses another']
+    if others:
+        words = ', '.join(f'{parent} -> {child}' for parent, child in sorted(others))
+        notes.append(f'several transforms of one name: {chain[0][0]} -> {chain[0][1]} is read, '
+                     f'not {words}; --topic odom_frame=NAME chooses another')
+    return notes
 
 
 def _streams(

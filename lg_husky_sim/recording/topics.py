@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 
 from lg_husky_sim.errors import RecordingError
@@ -42,6 +42,9 @@ NAMES: Mapping[str, tuple[str, ...]] = {
 
 TELLING = ('command', 'wheels', 'imu', 'pose')
 """Roles by whose topics a namespace is known to be a robot's."""
+
+DRIVING = frozenset({'command', 'wheels'})
+"""Those of them that a camera or another sensor never has."""
 
 PARTS = ('platform', 'sensors', 'husky_velocity_controller', 'platform_velocity_controller')
 """Namespaces of a robot's parts."""
@@ -117,12 +120,35 @@ class Topic:
     count: int
 
 
-def robots(present: Iterable[Topic], chosen: TopicMap) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class Robots:
     """
-    Return the namespaces of several robots in one bag, first the one to read.
+    Whose topics a bag holds, by namespace; an empty string is the robot without one.
 
-    Two namespaces are two robots if both have topics for two roles that tell. The one chosen
-    by hand is read, else the one with most roles, else with the likeliest topics.
+    Parameters
+    ----------
+    home : str or None
+        The robot to read; None where nothing tells.
+    others : tuple of str
+        Further robots, whose topics are not read.
+    beside : tuple of str
+        What looks like a robot but is none by itself, such as a camera with IMU and odometry:
+        it serves only where the robot has no topic of its own.
+    """
+
+    home: str | None = None
+    others: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+
+
+def robots(present: Iterable[Topic], chosen: TopicMap) -> Robots:
+    """
+    Tell the robots in one bag apart by their namespaces.
+
+    Two namespaces are two robots if both have topics for two roles that tell, wheels among
+    them; two that have a name also if commands are among them, and one of the two has wheels or
+    none in the bag. The one chosen by hand is read, else the one with most roles, else with
+    wheels or the likeliest topics.
 
     Parameters
     ----------
@@ -133,29 +159,58 @@ def robots(present: Iterable[Topic], chosen: TopicMap) -> tuple[str, ...]:
 
     Returns
     -------
-    tuple of str
-        Empty if there are not two; an empty string is the robot without namespace.
+    Robots
     """
-    topics = tuple(present)
-    roles: dict[str, list[str]] = {}
+    roles = _roles(tuple(present))
+    found = [space for space in roles
+             if any(_two_robots(space, other, roles) for other in roles if other != space)]
+    driving = [space for space in roles if not roles[space].isdisjoint(DRIVING)]
+    pool = found or driving or [space for space in roles if space == ''] or list(roles)
+    if not pool:
+        return Robots()
+    wished = next((space for space in _wished(chosen) if space in found), None)
+    home, *rest = sorted(pool, key=lambda space: (
+        space != wished, -len(roles[space]), 'wheels' not in roles[space]))
+    alike = tuple(space for space in roles if space != home and space not in found
+                  and any(len(roles[space] & roles[other]) > 1
+                          for other in roles if other != space))
+    # Of several robots, nothing tells whose relays or whose camera these are.
+    return Robots(home, (*rest, *alike)) if found else Robots(home, beside=alike)
+
+
+def _roles(topics: tuple[Topic, ...]) -> dict[str, set[str]]:
+    """Return the telling roles that each namespace has topics for, the likeliest first."""
+    roles: dict[str, set[str]] = {}
     for role in TELLING:
         for topic in candidates(role, topics):
             space = space_of(role, topic.name)
-            if (space is None or _is_source(topic.name)
-                    or (space == '' and topic.kind in TRANSFORMS)):  # all robots share /tf
-                continue
-            if role not in roles.setdefault(space, []):
-                roles[space].append(role)
-    found = [space for space in roles
-             if any(len(set(roles[space]) & set(roles[other])) >= 2
-                    for other in roles if other != space)]
+            if not (space is None or _is_source(topic.name) or _shared(space, topic)):
+                roles.setdefault(space, set()).add(role)
+    return roles
+
+
+def _two_robots(one: str, other: str, roles: Mapping[str, set[str]]) -> bool:
+    """
+    Say whether two namespaces are two robots.
+
+    Beside a robot with a name, topics without one are often its relays, and beside one without,
+    those with a name its parts; only wheels are never relayed.
+    """
+    both = roles[one] & roles[other]
+    if len(both) < 2 or 'wheels' in both:
+        return len(both) > 1
+    # Where only a third namespace has wheels, both may be parts of that robot.
+    wheeled = [space for space in roles if 'wheels' in roles[space]]
+    return ('command' in both and '' not in (one, other)
+            and (not wheeled or one in wheeled or other in wheeled))
+
+
+def _wished(chosen: TopicMap) -> list[str]:
+    """Return the namespaces of what was chosen by hand, what tells most first."""
     names = [_likely_space(role, getattr(chosen, role))
              for role in TELLING if getattr(chosen, role)]
-    names += [whole.split('/')[0]
-              for whole in (chosen.odom_frame.strip('/'), chosen.base_frame.strip('/'))
-              if '/' in whole]
-    wished = next((name for name in names if name in found), None)
-    return tuple(sorted(found, key=lambda space: (space != wished, -len(roles[space]))))
+    frames = (chosen.odom_frame.strip('/'), chosen.base_frame.strip('/'))
+    return names + [frame.split('/')[0] for frame in frames if '/' in frame]
 
 
 def space_of(role: str, name: str) -> str | None:
@@ -175,10 +230,13 @@ def _likely_space(role: str, name: str) -> str:
     return name.strip('/').split('/')[0] if space is None else space
 
 
-def _foreign(role: str, topic: Topic, others: Collection[str]) -> bool:
-    """Say whether a topic belongs to a robot that is not to be read."""
-    space = _likely_space(role, topic.name)
-    return space in others and not (space == '' and topic.kind in TRANSFORMS)
+def shared_transforms(topic: Topic) -> bool:
+    """Say whether all robots of a bag may write into a topic, as into /tf."""
+    return _shared(_likely_space('pose', topic.name), topic)
+
+
+def _shared(space: str, topic: Topic) -> bool:
+    return space == '' and topic.kind in TRANSFORMS
 
 
 def _is_source(name: str) -> bool:
@@ -186,7 +244,7 @@ def _is_source(name: str) -> bool:
 
 
 def candidates(
-    role: str, present: Iterable[Topic], chosen: str = '', others: Collection[str] = (),
+    role: str, present: Iterable[Topic], chosen: str = '', whose: Robots | None = None,
 ) -> tuple[Topic, ...]:
     """
     Return the topics that may hold a role, the likeliest first.
@@ -199,8 +257,8 @@ def candidates(
         Topics of the bag.
     chosen : str
         Topic chosen by hand; empty to look for one.
-    others : collection of str
-        Namespaces of robots that are not to be read.
+    whose : Robots, optional
+        Whose topics are to be read; without, those of all.
 
     Returns
     -------
@@ -215,6 +273,7 @@ def candidates(
     topics = tuple(present)
     if chosen:
         return _chosen(role, topics, chosen)
+    robot = whose or Robots()
     ranked = []
     for topic in topics:
         if topic.count == 0 or topic.kind not in TYPES[role]:
@@ -224,10 +283,18 @@ def candidates(
         if rank == len(NAMES[role]) and (role in NEEDS_NAME or generic):
             continue
         fallback = topic.kind == ODOMETRY  # only where no tf serves
-        if _foreign(role, topic, others):
+        space = _likely_space(role, topic.name)
+        shared = _shared(space, topic)
+        if space in robot.others and not shared:
             continue
+        beside = space in robot.beside and not shared
         source = role == 'command' and _is_source(topic.name)
-        ranked.append((fallback, rank, source, -topic.count, topic.name, topic))
+        # A camera's IMU is faster than the robot's. The busiest command is the multiplexer's
+        # output, wherever that stands.
+        away = 0 if role == 'command' else (space != robot.home) + (
+            space not in ('', robot.home))
+        ranked.append(
+            (beside, fallback, rank, source, away, -topic.count, topic.name, topic))
     return tuple(entry[-1] for entry in sorted(ranked, key=lambda entry: entry[:-1]))
 
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 import math
 import re
@@ -61,6 +61,25 @@ def _sides(names: tuple[str, ...], count: int) -> Sides | None:
 def named_wheels(names: tuple[str, ...]) -> bool:
     """Say whether a joint is called a wheel; then those that are not are none."""
     return any('wheel' in name.lower() for name in names if _driven(name))
+
+
+def passed_over(names: Iterable[str]) -> list[str]:
+    """
+    Return joints that might be taken for wheels where others are called so.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Joints of all messages of a topic, some of them called wheels.
+
+    Returns
+    -------
+    list of str
+        Those with a side that are not called wheels, such as a gripper's, and wheels without a
+        side; sorted.
+    """
+    return sorted(name for name in names
+                  if _driven(name) and ('wheel' in name.lower()) != bool(_side(name.lower())))
 
 
 def side_means(values: Sequence[float] | FloatArray, sides: Sides) -> tuple[float, float]:

@@ -8,15 +8,35 @@ from pathlib import Path
 from typing import Any
 
 from lg_husky_sim.recording import read_recording, Recording
+from lg_husky_sim.recording.clock import common_clock, Stamps
+from lg_husky_sim.signals import FloatArray
 import numpy as np
 import pytest
 
+TICKS: FloatArray = np.linspace(0.0, 60.0, 1200, endpoint=False)
+"""A minute at 20 Hz [s]."""
+SECONDS: FloatArray = np.linspace(0.0, 60.0, 60, endpoint=False)
+MAIN = ('command', 'wheels', 'imu', 'odom>base_link')
 FRONT_REAR = ('front_left_wheel', 'front_right_wheel', 'rear_left_wheel', 'rear_right_wheel')
 
 
 def _apart(recording: Recording, name: str) -> float:
     """Return how far a stream is ahead of the wheels, when both were logged alike [s]."""
     return float(np.median(recording.stream(name).times - recording.stream('wheels').times))
+
+
+def _stamps(logged: FloatArray, header: FloatArray | None) -> Stamps:
+    """Return stamps counted from a start, without header stamps where there are none."""
+    start, ns = 1_700_000_000_000_000_000, 1e9
+    return Stamps(start + np.rint(logged * ns).astype(np.int64),
+                  np.zeros(logged.size, dtype=np.int64) if header is None
+                  else start + np.rint(header * ns).astype(np.int64))
+
+
+def _jittered() -> dict[str, Stamps]:
+    """Return main streams whose headers are right and whose log times come late a little."""
+    random = np.random.default_rng(4)
+    return {name: _stamps(TICKS + random.uniform(0.0, 0.1, TICKS.size), TICKS) for name in MAIN}
 
 
 def _said(recording: Recording) -> str:
@@ -121,3 +141,77 @@ def test_without_log_times_small_offsets_are_no_clocks(bag: Any, tmp_path: Path)
     recording = read_recording(bag.write(tmp_path / 'bag'))
     assert recording.stream('command').times[-1] == recording.stream('wheels').times[-1]
     assert recording.notes == ()
+
+
+@pytest.mark.parametrize(('header', 'said'), [
+    (np.full(60, 3.0), 'stamps stand still'), (np.minimum(SECONDS, 20.0), 'clock drifts by 32.'),
+    (1.1 * SECONDS, 'clock drifts by 4.5 s')])
+def test_the_bad_clock_of_a_battery_costs_nothing_else(header: FloatArray, said: str) -> None:
+    streams = {**_jittered(), 'voltage': _stamps(SECONDS, header)}
+    times, notes = common_clock(streams)
+    for name in MAIN:
+        np.testing.assert_array_equal(times[name], streams[name].header)
+    np.testing.assert_array_equal(times['voltage'], streams['voltage'].logged)
+    assert len(notes) == 1
+    assert notes[0].startswith(f'voltage: header {said}')
+    assert notes[0].endswith(': log times taken for it')
+
+
+def test_header_stamps_of_a_battery_alone_are_held_against_log_times() -> None:
+    streams = {'wheels': _stamps(TICKS, None), 'voltage': _stamps(SECONDS, 1.1 * SECONDS)}
+    times, notes = common_clock(streams)
+    for name, stamps in streams.items():
+        np.testing.assert_array_equal(times[name], stamps.logged)
+    assert len(notes) == 1
+    assert notes[0].startswith('voltage: header clock drifts by 4')
+
+
+@pytest.mark.parametrize('stamped', [True, False])
+def test_a_battery_on_the_wall_clock_follows_slow_simulated_time(stamped: bool) -> None:
+    """Its samples stay beside those that were logged with them."""
+    streams = {name: _stamps(TICKS, 0.8 * TICKS) for name in MAIN}
+    streams['voltage'] = _stamps(SECONDS, SECONDS if stamped else None)
+    times, notes = common_clock(streams)
+    for name in MAIN:
+        np.testing.assert_array_equal(times[name], streams[name].header)
+    np.testing.assert_array_equal(times['voltage'], times['wheels'][::20])
+    assert ('voltage has no header stamps of use: log times shifted by 0.000 to -11.800 s onto '
+            'the header clock') in notes
+
+
+def test_a_stream_whose_stamps_stand_still_takes_log_times() -> None:
+    streams = {**_jittered(), 'imu': _stamps(TICKS, np.full(TICKS.size, 7.0))}
+    times, notes = common_clock(streams)
+    np.testing.assert_array_equal(times['imu'], streams['imu'].logged)
+    np.testing.assert_array_equal(times['wheels'], streams['wheels'].header)
+    assert notes == ['imu: header stamps stand still: log times taken for it']
+
+
+@pytest.mark.parametrize('unstamped', [None, 'command'])
+@pytest.mark.parametrize('name', MAIN)
+@pytest.mark.parametrize('congested', [(2.0, 18.0), (42.0, 58.0)])
+def test_messages_that_are_logged_late_for_a_while_keep_their_stamps(
+    congested: tuple[float, float], name: str, unstamped: str | None,
+) -> None:
+    """As over a link that is congested: the backlog grows, then all comes at once."""
+    streams = _jittered()
+    since = TICKS - congested[0]
+    over = (since < 0.0) | (since > congested[1] - congested[0])
+    late = np.where(over, 0.0, np.minimum(1.5, 2.0 * since))
+    streams[name] = _stamps(np.maximum.accumulate(TICKS + late), TICKS)
+    if unstamped:
+        streams[unstamped] = _stamps(TICKS, None)
+    times, notes = common_clock(streams)
+    for stamps in times.values():
+        np.testing.assert_array_equal(stamps, _stamps(TICKS, TICKS).header)
+    assert notes == []
+
+
+def test_a_simulator_that_pauses_while_commands_go_on_leaves_log_times() -> None:
+    """Its stamps are as regular as those of messages that come late, but it stays behind."""
+    logged = TICKS + 3.0 * (TICKS > 45.0)
+    streams = {name: _stamps(logged, TICKS) for name in MAIN}
+    streams['command'] = _stamps(TICKS, TICKS)
+    times, notes = common_clock(streams)
+    np.testing.assert_array_equal(times['wheels'], streams['wheels'].logged)
+    assert notes == ['header clock and log clock drift by 3.0 s: log times taken throughout']

@@ -9,10 +9,16 @@ from typing import Any
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.recording import read_recording, TopicMap
+from lg_husky_sim.recording.topics import Robots, robots, Topic
 import numpy as np
 import pytest
 
 FRONT_REAR = ('front_left_wheel', 'front_right_wheel', 'rear_left_wheel', 'rear_right_wheel')
+KINDS = {'cmd_vel': 'geometry_msgs/msg/Twist', 'joint_states': 'sensor_msgs/msg/JointState',
+         'data': 'sensor_msgs/msg/Imu', 'odom': 'nav_msgs/msg/Odometry',
+         'filtered': 'nav_msgs/msg/Odometry', 'tf': 'tf2_msgs/msg/TFMessage'}
+HUSKY = ('/cmd_vel', '/joint_states', '/imu/data', '/odometry/filtered', '/tf')
+CAMERA = ('/zed/zed_node/imu/data', '/zed/zed_node/odom')
 KNUCKLES = ('robotiq_85_left_knuckle_joint', 'robotiq_85_right_knuckle_joint')
 
 
@@ -94,6 +100,134 @@ def test_the_namespaces_of_one_robot_are_not_several(bag: Any, tmp_path: Path) -
     assert recording.notes == ()
 
 
+@pytest.mark.parametrize(('names', 'choice', 'expected'), [
+    ((*HUSKY, *CAMERA), '', Robots('', (), ('zed',))),
+    ((*HUSKY, *CAMERA), 'imu=/zed/zed_node/imu/data', Robots('', (), ('zed',))),
+    ((*HUSKY, *CAMERA), 'pose=/zed/zed_node/odom', Robots('', (), ('zed',))),
+    ((*HUSKY, '/move_base/cmd_vel'), 'command=/move_base/cmd_vel', Robots('')),
+    ((*HUSKY, '/wheel_controller/cmd_vel', '/wheel_controller/odom'),
+     'command=/wheel_controller/cmd_vel', Robots('', (), ('wheel_controller',))),
+    # Relays without a name, the robot with one.
+    (('/husky/cmd_vel', '/husky/joint_states', '/husky/odom', '/cmd_vel', '/odom', '/imu/data',
+      *CAMERA), '', Robots('husky', (), ('', 'zed'))),
+    # Two controllers and a robot that alone has wheels.
+    ((*HUSKY, '/b/cmd_vel', '/b/odom', '/c/cmd_vel', '/c/odom'), '', Robots('', (), ('b', 'c'))),
+    # Two robots, of one of which the joint states were not recorded, and somebody's relays.
+    (('/a/cmd_vel', '/a/joint_states', '/a/odom', '/b/cmd_vel', '/b/odom', '/b/imu/data',
+      '/cmd_vel', '/odom'), '', Robots('a', ('b', ''))),
+    (('/a/cmd_vel', '/a/joint_states', '/a/odom', '/b/cmd_vel', '/b/odom', '/b/imu/data'),
+     'pose=/b/odom', Robots('b', ('a',))),
+    # Two robots that each have all, and a camera that may be of either.
+    ((*HUSKY, *(f'/b{name}' for name in HUSKY), *CAMERA), 'imu=/zed/zed_node/imu/data',
+     Robots('b', ('', 'zed'))),
+    (('/a/imu/data', '/a/odom', '/b/imu/data', '/b/odom'), '', Robots('a', (), ('b',))),
+    (('/imu/data', *CAMERA), '', Robots('')),
+    (('/diagnostics/data',), '', Robots()),
+])
+def test_which_namespaces_are_robots(
+    names: tuple[str, ...], choice: str, expected: Robots,
+) -> None:
+    topics = [Topic(name, KINDS[name.split('/')[-1]], 10) for name in names]
+    chosen = TopicMap.parse([choice] if choice else [])
+    assert robots(topics, chosen) == expected
+
+
+def _add_camera(bag: Any, t: float) -> None:
+    for late in (0.0, 0.02, 0.04):  # faster than the robot's own
+        bag.imu(t + late, 2.0, topic='/zed/zed_node/imu/data')
+    bag.odometry(t, 2.0, 0.0, 0.0, topic='/zed/zed_node/odom')
+
+
+@pytest.mark.parametrize(('choices', 'cameras'), [
+    ((), ()), (('imu=/zed/zed_node/imu/data',), ('imu',)),
+    (('pose=/zed/zed_node/odom',), ('pose',)),
+    (('imu=/zed/zed_node/imu/data', 'pose=/zed/zed_node/odom'), ('imu', 'pose'))])
+def test_a_camera_with_imu_and_odometry_is_no_robot(
+    choices: tuple[str, ...], cameras: tuple[str, ...], bag: Any, tmp_path: Path,
+) -> None:
+    _add_robot(bag, '', 1.0, commands=20, wheels=20)
+    for k in range(20):
+        bag.imu(1.0 + 0.1 * k, 1.0)
+        bag.odometry(1.0 + 0.1 * k, 1.0, 0.0, 0.0, topic='/odometry/filtered')
+        _add_camera(bag, 1.0 + 0.1 * k)
+    recording = read_recording(bag.write(tmp_path / 'bag'), TopicMap.parse(choices))
+    assert {name: set(series.values[:, 0]) for name, series in recording.streams.items()} == {
+        name: {2.0 if name in cameras else 1.0} for name in ('command', 'wheels', 'imu', 'pose')}
+    assert 'several robots' not in ' '.join(recording.notes)
+
+
+def test_the_imu_of_the_robot_comes_before_a_faster_one(bag: Any, tmp_path: Path) -> None:
+    for k in range(10):
+        bag.joints(1.0 + 0.1 * k, FRONT_REAR, [1.0] * 4)
+        bag.imu(1.0 + 0.1 * k, 1.0, topic='/imu/data')
+        bag.imu(1.0 + 0.1 * k, 2.0, topic='/camera/imu/data')
+        bag.imu(1.05 + 0.1 * k, 2.0, topic='/camera/imu/data')
+    assert read_recording(bag.write(tmp_path / 'bag')).topics['imu'] == '/imu/data'
+
+
+@pytest.mark.parametrize('choices', [(), ('command=/cmd_vel',)])
+def test_relays_without_a_name_complete_a_robot(
+    choices: tuple[str, ...], bag: Any, tmp_path: Path,
+) -> None:
+    for k in range(10):
+        t = 1.0 + 0.1 * k
+        bag.twist(t, 1.0, 0.0, topic='/husky/husky_velocity_controller/cmd_vel')
+        bag.joints(t, FRONT_REAR, [1.0] * 4, topic='/husky/joint_states')
+        bag.odometry(t, 1.0, 0.0, 0.0, topic='/husky/husky_velocity_controller/odom')
+        bag.twist(t, 1.0, 0.0, topic='/cmd_vel')
+        bag.odometry(t, 1.0, 0.0, 0.0, topic='/odom')
+        bag.imu(t, 1.0, topic='/imu/data')
+        _add_camera(bag, t)
+    recording = read_recording(bag.write(tmp_path / 'bag'), TopicMap.parse(choices))
+    for series in recording.streams.values():
+        assert set(series.values[:, 0]) == {1.0}
+    assert set(recording.streams) == {'command', 'wheels', 'imu', 'pose'}
+    assert ('husky' in recording.topics['command']) == (not choices)
+    assert 'several robots' not in ' '.join(recording.notes)
+
+
+def _add_two_without_prefix(bag: Any, first: str) -> None:
+    for k in range(10):
+        t = 1.0 + 0.1 * k
+        for name, value in ((first, 1.0), ('/a', 2.0)):
+            bag.twist(t, value, 0.0, topic=f'{name}/cmd_vel')
+            bag.joints(t, FRONT_REAR, [value] * 4, topic=f'{name}/joint_states')
+        bag.transforms(t, [('odom', 'base_link', 1.0, 0.0, 0.0)])
+
+
+@pytest.mark.parametrize('own', [None, 'odometry', 'tf'])
+def test_the_pose_of_the_robot_without_a_name_is_not_given_to_another(
+    own: str | None, bag: Any, tmp_path: Path,
+) -> None:
+    _add_two_without_prefix(bag, '')
+    for k in range(10):
+        if own == 'odometry':
+            bag.odometry(1.0 + 0.1 * k, 2.0, 0.0, 0.0, topic='/a/odom')
+        elif own == 'tf':  # in a topic of its own, frames need no name
+            bag.transforms(1.0 + 0.1 * k, [('odom', 'base_link', 2.0, 0.0, 0.0)], topic='/a/tf')
+    path = bag.write(tmp_path / 'bag')
+    choice = TopicMap(wheels='/a/joint_states')
+    recording = read_recording(path, choice)
+    assert set(recording.stream('wheels').values[:, 0]) == {2.0}
+    if own is None:
+        assert 'pose' not in recording.streams
+        assert 'no pose of /a in /tf: it holds odom -> base_link' in recording.notes
+    else:
+        assert set(recording.stream('pose').values[:, 0]) == {2.0}
+    nameless = read_recording(path, TopicMap(wheels='/joint_states'))
+    assert set(nameless.stream('pose').values[:, 0]) == {1.0}
+    if own is None:
+        by_hand = read_recording(path, TopicMap(wheels='/a/joint_states', odom_frame='odom'))
+        assert set(by_hand.stream('pose').values[:, 0]) == {1.0}
+
+
+def test_frames_that_name_neither_of_two_robots_are_noted(bag: Any, tmp_path: Path) -> None:
+    _add_two_without_prefix(bag, '/b')
+    recording = read_recording(bag.write(tmp_path / 'bag'))
+    assert 'pose' in recording.streams
+    assert 'odom -> base_link in /tf names no robot: taken for that of /a' in recording.notes
+
+
 @pytest.mark.parametrize('first', ['wheels', 'gripper'])
 def test_joints_of_a_gripper_are_no_wheels(first: str, bag: Any, tmp_path: Path) -> None:
     wheels = 0.0 if first == 'wheels' else 0.02
@@ -102,6 +236,22 @@ def test_joints_of_a_gripper_are_no_wheels(first: str, bag: Any, tmp_path: Path)
         bag.joints(1.01 + 0.1 * k, KNUCKLES, [0.0] * 2)
     recording = read_recording(bag.write(tmp_path / 'bag'))
     np.testing.assert_array_equal(recording.stream('wheels').values, [(3.0, 3.0)] * 20)
+    assert recording.notes == (
+        f'wheels: joints not called wheels, or of no side, were passed over: {KNUCKLES[0]}, '
+        f'{KNUCKLES[1]}',)
+
+
+@pytest.mark.parametrize(('further', 'said'), [
+    ((), ''), (('pan_tilt', 'front_left_steer_joint', 'elbow'), ''),
+    (('left_elbow', 'wheel_5'), 'left_elbow, wheel_5'),
+    (tuple(f'right_arm{k}_joint' for k in range(9)), ''),
+    (tuple(f'right_{k}' for k in range(6)), 'right_0, right_1, right_2, right_3 and 2 more')])
+def test_joints_that_might_be_wheels_are_noted(
+    further: tuple[str, ...], said: str, bag: Any, tmp_path: Path,
+) -> None:
+    bag.joints(1.0, (*FRONT_REAR, *further), [1.0] * (4 + len(further)))
+    notes = ' '.join(read_recording(bag.write(tmp_path / 'bag')).notes)
+    assert notes.partition('passed over: ')[2] == said
 
 
 @pytest.mark.parametrize('velocities', [True, False])
