@@ -85,7 +85,7 @@ def _load(model: str) -> tuple[Netlist, str]:
     loaded = load_model(path)
     graph = loaded.structure.network().graph
     return Netlist(loaded.about or path.stem, graph, _values(loaded),
-                   _paper_outputs(graph)), _left_out(loaded.structure)
+                   _paper_outputs(graph)), _shown(loaded.structure)
 
 
 def _values(model: ModelFile) -> Mapping[str, float]:
@@ -96,14 +96,17 @@ def _values(model: ModelFile) -> Mapping[str, float]:
     return values
 
 
-def _left_out(structure: Structure) -> str:
-    """Name the effects that are no part of the graph."""
+def _shown(structure: Structure) -> str:
+    """Say which effects are no part of the graph, and which of two graphs it is."""
     from lg_husky_sim.husky.effects import Subsystem
 
     names = dict.fromkeys(effect.id for effect in structure.in_force() if effect.kind.subsystem
                           in (Subsystem.COMMAND, Subsystem.SENSOR))
-    return ('Not in the matrices and poles, which are those of the graph alone: '
-            f'{", ".join(names)}') if names else ''
+    left_out = ('Not in the matrices and poles, which are those of the graph alone: '
+                f'{", ".join(names)}') if names else ''
+    late = dict.fromkeys(effect.id for effect in structure.in_force() if effect.late)
+    onset = f'The model after the onset of {", ".join(late)}' if late else ''
+    return '. '.join(text for text in (onset, left_out) if text)
 
 
 def _paper_outputs(graph: LinearGraph) -> tuple[str, ...]:

@@ -109,6 +109,7 @@ def test_a_changed_effect_has_its_later_numbers(
     np.testing.assert_allclose(poles, after, rtol=1e-5)
     assert not np.allclose(poles, before, rtol=1e-3)
     assert 'Not in the matrices' not in shown
+    assert 'The model after the onset of payload' in shown.splitlines()
 
 
 @pytest.mark.parametrize('form', [[], ['--latex']])
@@ -117,8 +118,8 @@ def test_effects_outside_the_graph_are_named(
     path = tmp_path / 'model.yaml'
     save_model(diagnosed(Effect('speed_loop'), Effect('encoder_scale', side='left')), path)
     assert run(['derive', '--model', str(path), *form]) == 0
-    line = ('Not in the matrices and poles, which are those of the graph alone: '
-            'speed_loop, encoder_scale')
+    line = ('The model after the onset of payload. Not in the matrices and poles, which are those '
+            'of the graph alone: speed_loop, encoder_scale')
     assert ('% ' * bool(form) + line) in capsys.readouterr().out.splitlines()
 
 
