@@ -92,9 +92,8 @@ def plants_in(
     found = []
     for named in plants:
         onset = named.plant.onset
-        earlier = names[:names.index(onset.recording)] if (
-            onset is not None and onset.recording in names) else ()
-        found.append(replace(named, plant=named.plant.in_recording(name, earlier)))
+        found.append(named if onset is None else replace(
+            named, plant=named.plant.in_recording(name, onset.before(names))))
     return tuple(found)
 
 

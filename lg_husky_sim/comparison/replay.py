@@ -11,6 +11,7 @@ from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import BodyTwist, Pose, TimeSeries
 from lg_husky_sim.simulation import rollout, Simulator
+from lg_husky_sim.simulation.starting import commanded_until
 import numpy as np
 
 PERIOD = 0.01
@@ -52,7 +53,8 @@ def initial_state(segment: Segment, plant: Plant, window: float = WINDOW) -> Ini
     time. Otherwise the pose is the value at the start of a straight line through the first
     samples, which takes most of the sensor's noise out; the speed is that of the wheels as if
     they did not slip, or the slope of the pose without them; the yaw rate is the gyro's, or else
-    the slope of the heading, or else the wheels'.
+    the slope of the heading, or else the wheels'. A slope at the start that points against the
+    way that follows is that of a curve through a rest and a departure, and is taken as rest.
 
     Parameters
     ----------
@@ -78,8 +80,10 @@ def initial_state(segment: Segment, plant: Plant, window: float = WINDOW) -> Ini
         if len(still):
             value = np.median(still, axis=0)
         pose = Pose(*(float(part) for part in value))
-        forward = float(np.cos(pose.heading) * slope[0] + np.sin(pose.heading) * slope[1])
-        yaw = float(slope[2])
+        _, mean = local_fit(streams['pose'], start + 0.5 * window, window)
+        own = np.array([[np.cos(pose.heading), np.sin(pose.heading), 0.0], [0.0, 0.0, 1.0]])
+        at_start, on_average = own @ slope, own @ mean
+        forward, yaw = np.where(at_start * on_average < 0.0, 0.0, at_start).tolist()
     if 'wheels' in streams:
         left, right = (float(rate) for rate in streams['wheels'].values[0])
         rates = (left, right)
@@ -122,21 +126,9 @@ def replay(
     at = start or initial_state(segment, plant)
     end = segment.end + period  # the last sample lies inside the grid
     truth = rollout(plant, segment.streams['command'], end, period, segment.start, at.pose,
-                    at.twist, at.wheel_rates, at.wheel_angles, _commanded(segment, at, plant))
+                    at.twist, at.wheel_rates, at.wheel_angles, commanded_until(
+                        segment.start, segment.streams['command'], at.twist, at.wheel_rates))
     return plant.observe(truth)
-
-
-def _commanded(segment: Segment, at: InitialState, plant: Plant) -> BodyTwist | None:
-    """Return what a robot that starts in motion follows: the command that is in force then."""
-    moving = any((*(at.wheel_rates or ()), at.twist.forward, at.twist.yaw))
-    commands = segment.streams['command']
-    if not moving or commands.times[0] > segment.start + PERIOD:
-        return None
-    place = max(int(np.searchsorted(commands.times, segment.start, side='right')) - 1, 0)
-    stage = plant.sets[0].command
-    forward, yaw = (float(np.clip(value, -limit, limit)) for value, limit in zip(
-        commands.values[place], (stage.limit_forward, stage.limit_yaw), strict=True))
-    return BodyTwist(forward, yaw)
 
 
 def _rest(segment: Segment) -> float:

@@ -16,6 +16,7 @@ from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.problem import Channel, Observations, PERIOD, Piece
 from lg_husky_sim.signals import FloatArray, TimeSeries
 from lg_husky_sim.simulation.simulator import hold
+from lg_husky_sim.simulation.starting import commanded_until
 import numpy as np
 from scipy.optimize import minimize
 from scipy.signal import lfilter
@@ -65,13 +66,15 @@ def driven(piece: Piece, channel: Channel, time_constant: float, delay: float) -
     """
     late = TimeSeries(piece.commands.times + delay, piece.commands.values, piece.commands.names)
     held = hold(late, piece.start, PERIOD, piece.count)
-    held[:max(0, round(delay / PERIOD))] = piece.commands.values[0]
+    told = commanded_until(piece.start, piece.commands, piece.twist, piece.wheels_began)
+    before = np.array([[told.forward, told.yaw]])
+    held[:max(0, round(delay / PERIOD))] = before
     states: FloatArray = held
     if time_constant > 0.0:
         pole = np.exp(-PERIOD / time_constant)
         states = lfilter([1.0 - pole], [1.0, -pole], held, axis=0,
-                         zi=_start(piece, held[0], pole))[0]
-    grid = np.vstack([held[:1] if time_constant <= 0.0 else _start(piece, held[0], 1.0), states])
+                         zi=before * pole)[0]
+    grid = np.vstack([held[:1] if time_constant <= 0.0 else before, states])
     way = np.vstack([np.zeros((1, 2)), np.cumsum(0.5 * (grid[1:] + grid[:-1]), axis=0)]) * PERIOD
     columns = []
     for column in _INPUTS[channel.name]:
@@ -82,12 +85,6 @@ def driven(piece: Piece, channel: Channel, time_constant: float, delay: float) -
         else:
             columns.append(_at(grid[:, column], piece.start, channel.times))
     return np.column_stack(columns)
-
-
-def _start(piece: Piece, first: FloatArray, pole: float) -> FloatArray:
-    # At rest if the robot was, else what was commanded first.
-    rest = not any(piece.wheel_rates) and not piece.twist.forward
-    return (np.zeros((1, 2)) if rest else first[None, :]) * pole
 
 
 def _at(column: FloatArray, start: float, times: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from lg_husky_sim.husky.effects import Onset
+from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 
@@ -156,6 +156,29 @@ class Plant:
             return self
         return Plant((self.sets[0 if before else 1],), self.states)
 
+    def late(self, times: FloatArray, x: FloatArray) -> np.typing.NDArray[np.bool_]:
+        """
+        Return when the effects of the second set are on.
+
+        Parameters
+        ----------
+        times, x : numpy.ndarray, shape (n,)
+            On the recording's clock [s], and where the robot is then [m]; NaN if not known.
+
+        Returns
+        -------
+        numpy.ndarray of bool, shape (n,)
+        """
+        if self.onset is None:
+            return np.zeros(times.size, dtype=bool)
+        match self.onset.kind:
+            case OnsetKind.TIME:
+                return times >= self.onset.value
+            case OnsetKind.PLACE_ABOVE:
+                return x >= self.onset.value
+            case OnsetKind.PLACE_BELOW:
+                return x <= self.onset.value
+
     def observe(self, truth: TimeSeries) -> TimeSeries:
         """
         Return what the sensors read of a simulated truth, on the same stamps.
@@ -173,12 +196,7 @@ class Plant:
             and bias, every stream by its delay. Speed, distance, currents and voltages are left
             as they are.
         """
-        late = np.zeros(len(truth), dtype=bool)
-        if self.onset is not None:
-            place = truth.times if self.onset.kind.value == 'time' else truth.column('x')
-            late = place >= self.onset.value
-            if self.onset.kind.value == 'place_below':
-                late = place <= self.onset.value
+        late = self.late(truth.times, truth.column('x'))
         values = np.array(truth.values)
         for index, one in enumerate(self.sets):
             where = late if index else np.ones(len(truth), dtype=bool)

@@ -11,6 +11,7 @@ from lg_husky_sim.identification.pieces import PERIOD, Piece
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation.kernel import COLUMNS, run
 from lg_husky_sim.simulation.simulator import hold, Simulator
+from lg_husky_sim.simulation.starting import commanded_until
 import numpy as np
 
 #: Time between two resets of the simulated pose and wheel angles to the measured ones [s].
@@ -42,8 +43,7 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
         onset: it would be out of phase after a few turns otherwise. The angle columns go on
         without a jump.
     """
-    commands = piece.commands
-    held = _held(piece, latency)
+    held, before = _held(piece, latency)
     twist, rates = piece.twist, piece.wheel_rates
     if correction is not None:
         forward, yaw, left, right = (float(c) for c in np.add(piece.began, correction))
@@ -52,9 +52,6 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
     stride = max(1, round(RESET / PERIOD)) if known else piece.count or 1
     poses = _poses(piece, stride)
     angles = _angles(piece, stride, simulator.plant.sets[0].sensors)
-    # What was commanded before a piece is taken to be its first command.
-    before = BodyTwist(*held[0].tolist()) if (
-        len(commands) and commands.times[0] <= piece.start + PERIOD) else None
     state = simulator.initial(poses[0], twist, piece.start, rates, piece.wheel_angles, before)
     flat = np.array(state.flat)
     out = np.empty((piece.count + 1, len(COLUMNS)))
@@ -78,11 +75,19 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
 
 
 @lru_cache(maxsize=256)
-def _held(piece: Piece, latency: float) -> FloatArray:
+def _held(piece: Piece, latency: float) -> tuple[FloatArray, BodyTwist]:
+    # Commands in each step, and those until the start. Measured and not corrected motion tells
+    # whether the piece begins at rest: a start that is estimated would switch it over.
     commands = piece.commands
+    before = commanded_until(piece.start, commands, piece.twist, piece.wheels_began)
     if latency:
-        commands = TimeSeries(commands.times + latency, commands.values, commands.names)
-    return hold(commands, piece.start, PERIOD, piece.count)
+        times, values = commands.times + latency, commands.values
+        if times.size and times[0] > piece.start:
+            # Late by the dead time, the commands leave a gap that those before them fill.
+            times = np.insert(times, 0, piece.start)
+            values = np.insert(values, 0, (before.forward, before.yaw), axis=0)
+        commands = TimeSeries(times, values, commands.names)
+    return hold(commands, piece.start, PERIOD, piece.count), before
 
 
 def _angles(piece: Piece, stride: int, sensors: SensorModel) -> FloatArray | None:

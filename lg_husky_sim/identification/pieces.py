@@ -14,6 +14,7 @@ import math
 
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import BodyTwist, FloatArray, TimeSeries
+from lg_husky_sim.simulation import starting
 import numpy as np
 
 #: Grid of the simulation [s].
@@ -117,6 +118,11 @@ class Piece:
         """Measured state at the start, in the order of :data:`CORRECTIONS`."""
         return (self.twist.forward, self.twist.yaw, *self.wheel_rates)
 
+    @property
+    def wheels_began(self) -> tuple[float, float] | None:
+        """Measured wheel rates at the start [rad/s]; None where none were."""
+        return self.wheel_rates if self.told[CORRECTIONS.index('initial_left')] else None
+
 
 def correction_name(piece: Piece, place: int) -> str:
     """Return the name of a correction of a piece's start, its place in CORRECTIONS given."""
@@ -205,7 +211,8 @@ def piece_of(segment: Segment, settle: float = SETTLE) -> Piece | None:
             forward = float(increments[0].values[0])
             pose_told = float(increments[0].begins[0]) <= start + EARLY
             yaw = yaw if imu is not None else float(increments[1].values[0])
-    still = abs(forward) < 0.05 and abs(yaw) < 0.05 and max(map(abs, rates)) < 0.3
+    still = (starting.at_rest(BodyTwist(forward, yaw))
+             and starting.at_rest(BodyTwist(), (rates[0], rates[1])))
     begin = start if still else start + settle
     if wheels is not None:
         part = _thinned(wheels.times)

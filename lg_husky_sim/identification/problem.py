@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import TypeAlias
 
 from lg_husky_sim.errors import RecordingError
-from lg_husky_sim.husky.plant import ENCODER_WINDOW, Plant, SensorModel
+from lg_husky_sim.husky.plant import ENCODER_WINDOW, Plant, PlantSet, SensorModel
 from lg_husky_sim.identification.piece_simulation import simulate_piece
 from lg_husky_sim.identification.pieces import (
     Channel,
@@ -166,18 +166,17 @@ class Observations:
         tuple of numpy.ndarray, shape (count + 1, 15)
             The kernel's columns, a piece each.
         """
-        simulators: dict[int, Simulator] = {}
+        simulators: dict[tuple[PlantSet, ...], Simulator] = {}
         grids = []
         for place, piece in enumerate(self.pieces):
             own = None if corrections is None else corrections[place]
             if known is not None and own is not None and np.array_equal(own, known[0][place]):
                 grids.append(known[1][place])
                 continue
-            number = self._regime(plant, piece.recording)
-            if number not in simulators:
-                simulators[number] = Simulator(self.plant_in(plant, piece.recording), PERIOD,
-                                               fine_pose=False)
-            grids.append(simulate_piece(simulators[number], piece, latency, own))
+            here = self.plant_in(plant, piece.recording)
+            if here.sets not in simulators:
+                simulators[here.sets] = Simulator(here, PERIOD, fine_pose=False)
+            grids.append(simulate_piece(simulators[here.sets], piece, latency, own))
         return tuple(grids)
 
     def observe(self, plant: Plant, grids: Sequence[FloatArray],
@@ -200,15 +199,6 @@ class Observations:
         parts = [_observe(piece, self.plant_in(plant, piece.recording), grid, extra or {})
                  for piece, grid in zip(self.pieces, grids, strict=True)]
         return np.concatenate(parts) if parts else np.zeros(0)
-
-    def _regime(self, plant: Plant, recording: str) -> int:
-        # 0 in or without the onset's recording, -1 before it, 1 after it; a place stays a place.
-        onset = plant.onset
-        if onset is None or onset.recording in ('', recording):
-            return 0
-        if recording in onset.before(self.recordings):
-            return -1
-        return int(onset.kind.value == 'time')
 
     @cached_property
     def recordings(self) -> tuple[str, ...]:
@@ -259,15 +249,9 @@ def late_mask(plant: Plant, piece: Piece, times: FloatArray) -> NDArray[np.bool_
     -------
     numpy.ndarray of bool, shape (n,)
     """
-    onset = plant.onset
-    if onset is None:
-        return np.zeros(times.size, dtype=bool)
-    if onset.kind.value == 'time':
-        return times >= onset.value
-    if piece.pose is None:
-        return np.zeros(times.size, dtype=bool)
-    x = np.interp(times, piece.pose.times, piece.pose.column('x'))
-    return x >= onset.value if onset.kind.value == 'place_above' else x <= onset.value
+    x = np.full(times.size, np.nan) if piece.pose is None else np.interp(
+        times, piece.pose.times, piece.pose.column('x'))
+    return plant.late(times, x)
 
 
 def _seen(channel: Channel, piece: Piece, grid: FloatArray, angle: FloatArray,

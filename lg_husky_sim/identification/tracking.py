@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from lg_husky_sim.errors import FitError, LgHuskyError
 from lg_husky_sim.husky.model import HuskyModel
@@ -13,10 +13,12 @@ from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.halves import can_split, HalvesMaker
 from lg_husky_sim.identification.lanes import operators, tracking_cost
+from lg_husky_sim.identification.pieces import piece_of
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose
 from lg_husky_sim.simulation.kernel import COLUMNS
 from lg_husky_sim.simulation.simulator import hold, Simulator
+from lg_husky_sim.simulation.starting import at_rest, commanded_until
 import numpy as np
 
 #: Step of the simulation [s], as in the paper's 50 Hz data.
@@ -43,8 +45,8 @@ class Track:
         At the start.
     twist : BodyTwist
         At the start.
-    wheel_rates : tuple of float
-        Left and right at the start [rad/s].
+    wheel_rates : tuple of float or None
+        Left and right at the start [rad/s]; None where none were recorded: the wheels roll.
     steps : numpy.ndarray of int64, shape (n_samples,)
         Step in which each measured position lies.
     shares : numpy.ndarray, shape (n_samples,)
@@ -54,6 +56,8 @@ class Track:
     recording : str
     recordings : tuple of str
         All that are fitted, in their order: some effects begin between them.
+    before : BodyTwist
+        What had been commanded until the start.
     """
 
     name: str
@@ -61,12 +65,13 @@ class Track:
     commands: FloatArray
     pose: Pose
     twist: BodyTwist
-    wheel_rates: tuple[float, float]
+    wheel_rates: tuple[float, float] | None
     steps: np.typing.NDArray[np.int64]
     shares: FloatArray
     targets: FloatArray
     recording: str = ''
     recordings: tuple[str, ...] = ()
+    before: BodyTwist = field(default_factory=BodyTwist)
 
     @property
     def times(self) -> FloatArray:
@@ -85,7 +90,8 @@ class Track:
         if plant.onset is not None:
             plant = plant.in_recording(self.recording, plant.onset.before(self.recordings))
         simulator = Simulator(plant, PERIOD, fine_pose=False)
-        state = simulator.initial(self.pose, self.twist, self.start, self.wheel_rates)
+        state = simulator.initial(self.pose, self.twist, self.start, self.wheel_rates,
+                                  command=self.before)
         _, out = simulator.run(state, self.commands)
         grid = np.vstack([state.row, out])[:, [_X, _Y]]
         before, after = grid[self.steps], grid[self.steps + 1]
@@ -116,19 +122,19 @@ def track_of(segment: Segment, recordings: Sequence[str] = ()) -> Track | None:
     early = pose.slice(start, start + REST)
     moved = np.hypot(np.ptp(early.column('x')), np.ptp(early.column('y')))
     active = commands.slice(-np.inf, start + REST).values
-    rest = not np.any(active) and moved < 0.1
-    if rest:
+    first, piece = Pose(*map(float, pose.values[0])), piece_of(segment)
+    twist = BodyTwist()
+    rates: tuple[float, float] | None = (0.0, 0.0)
+    if not np.any(active) and moved < 0.1:
         # At rest the mean of the first positions, of which each is noisy.
         first = Pose(*(float(np.mean(early.column(n))) for n in ('x', 'y', 'heading')))
-        twist, rates = BodyTwist(), (0.0, 0.0)
-    else:
-        first = Pose(*(float(v) for v in pose.values[0]))
+    elif piece is None or not at_rest(piece.twist, piece.wheels_began):
         span = max(float(early.times[-1] - start), 1e-3)
         way = early.values[-1] - early.values[0]
         along = way[0] * np.cos(first.heading) + way[1] * np.sin(first.heading)
         twist = BodyTwist(float(along) / span, float(way[2]) / span)
         near = None if wheels is None else wheels.slice(start, start + REST)
-        rates = (0.0, 0.0) if near is None or not len(near) else (
+        rates = None if near is None or not len(near) else (
             float(np.median(near.column('left'))), float(np.median(near.column('right'))))
     place = (pose.times - start) / PERIOD
     count = max(1, int(np.ceil(place[-1] - 1e-9)))
@@ -136,7 +142,7 @@ def track_of(segment: Segment, recordings: Sequence[str] = ()) -> Track | None:
     return Track(f'{segment.recording}[{segment.index}]', start,
                  hold(commands, start, PERIOD, count), first, twist, rates, steps,
                  place - steps, np.ascontiguousarray(pose.values[:, :2]), segment.recording,
-                 tuple(recordings))
+                 tuple(recordings), commanded_until(start, commands, twist, rates))
 
 
 class TrackingObjective:
@@ -169,13 +175,19 @@ class TrackingObjective:
         self.model, self.parameters, self.free = model, parameters, free
         self._maker = (HalvesMaker(model, parameters, free)
                        if can_split(model, parameters) else None)
-        self._begins = [self._begin(track) for track in self.tracks]
+        self._begins = [self._begin(track) for track in self.tracks if self.batched]
 
     def _begin(self, track: Track) -> FloatArray:
         # The two halves' states at the start: (wheels, body, current) of mean and difference.
-        left, right = track.wheel_rates
-        return np.array([0.5 * (left + right), track.twist.forward, 0.0, 0.5 * (right - left),
-                         track.twist.yaw, 0.0, track.pose.x, track.pose.y, track.pose.heading])
+        # What was not measured is that of the given parameters for all candidates: currents,
+        # and wheels that follow their motors, are forgotten within milliseconds.
+        plant = self.model.at(self.parameters)
+        state = Simulator(plant, PERIOD, fine_pose=False).initial(
+            track.pose, track.twist, track.start, track.wheel_rates)
+        left, right, forward, yaw, *currents = plant.sets[0].rows[:6] @ state.flat[:state.n]
+        return np.array([0.5 * (left + right), forward, 0.5 * (currents[0] + currents[1]),
+                         0.5 * (right - left), yaw, 0.5 * (currents[1] - currents[0]),
+                         track.pose.x, track.pose.y, track.pose.heading])
 
     @property
     def batched(self) -> bool:

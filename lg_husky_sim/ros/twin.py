@@ -14,8 +14,10 @@ from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.ros import api
 from lg_husky_sim.ros.conversions import twist_from_msg
 from lg_husky_sim.ros.settings import Settings
-from lg_husky_sim.signals import BodyTwist
+from lg_husky_sim.signals import BodyTwist, TimeSeries
 from lg_husky_sim.simulation import Simulator, SimulatorState
+from lg_husky_sim.simulation.starting import commanded_until
+import numpy as np
 
 NAME = 'lg_husky_twin'
 #: Step of the models, and age from which a running error forgets [s].
@@ -93,7 +95,7 @@ class Shadow:
         self._simulator.step(self._simulator.initial(), BodyTwist(0.0, 0.0))
         self._state: SimulatorState | None = None
         self._command = BodyTwist(0.0, 0.0)
-        self._since = -math.inf
+        self._since = 0.0
 
     def command(self, moment: float, command: BodyTwist) -> None:
         """Advance to a moment [s], then obey another command."""
@@ -117,9 +119,12 @@ class Shadow:
             self._advance(moment))
         if state is None:
             # A robot that moves already rolls, and follows what it was told last.
+            twist = self._simulator.rolling(left, right)
+            last = TimeSeries(np.array([self._since]), np.array(
+                [[self._command.forward, self._command.yaw]]), ('forward', 'yaw'))
             self._state = self._simulator.initial(
-                time=moment, twist=self._simulator.rolling(left, right),
-                wheel_rates=(left, right), command=self._command)
+                time=moment, twist=twist, wheel_rates=(left, right), command=commanded_until(
+                    moment, last, twist, (left, right), self.timeout))
             return
         sensors = self.plant.sets[0].sensors
         rates = state.wheel_rates

@@ -10,7 +10,7 @@ import math
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.laws import MEMORY
-from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.husky.plant import Plant, PlantSet
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation.discretise import discretise, Operators
 from lg_husky_sim.simulation.kernel import COLUMNS, DELAY, run
@@ -134,8 +134,8 @@ class Simulator:
         wheel_angles : tuple of float
             Left and right [rad].
         command : BodyTwist, optional
-            What has been commanded until then, which a base with dead time or limits of the
-            acceleration still follows; nothing if not given.
+            What has been commanded until then, which a base with dead time or limits still
+            follows, as if it had been for long: a ramp up to it is over. Nothing if not given.
 
         Returns
         -------
@@ -147,7 +147,7 @@ class Simulator:
         n = self.operators.n
         flat = np.zeros(n + _TAIL)
         if wheel_rates is None and (twist.forward or twist.yaw):
-            wheel_rates = self._rolling(twist)
+            wheel_rates = self._rates_without_slip(twist)
         wanted = np.array([*(wheel_rates or (0.0, 0.0)), twist.forward, twist.yaw])
         if np.any(wanted):
             # The nearest steady drive, so that controllers and belts start where they would be,
@@ -160,13 +160,20 @@ class Simulator:
         flat[n + 3:n + 7] = pose.heading, pose.x, pose.y, time
         if command is not None:
             stage = n + 11
-            flat[stage:stage + 2] = command.forward, command.yaw
+            limit = self._in_force(time, pose.x).command
+            flat[stage] = max(-limit.limit_forward, min(limit.limit_forward, command.forward))
+            flat[stage + 1] = max(-limit.limit_yaw, min(limit.limit_yaw, command.yaw))
             flat[stage + 3:stage + 3 + DELAY] = command.forward
             flat[stage + 3 + DELAY:] = command.yaw
         row = np.zeros(len(COLUMNS))
         row[:4] = wanted
         row[7:13] = *wheel_angles, 0.0, pose.heading, pose.x, pose.y
         return _state(flat, row, self.plant.states)
+
+    def _in_force(self, time: float, x: float) -> PlantSet:
+        # The set that the kernel's next step uses.
+        sets, middle = self.plant.sets, time + 0.5 * self.period
+        return sets[-1] if self.plant.late(np.array([middle]), np.array([x]))[0] else sets[0]
 
     def rolling(self, left: float, right: float) -> BodyTwist:
         """Return the velocity at which wheels of these rates [rad/s] do not slip."""
@@ -180,8 +187,8 @@ class Simulator:
         one = self.plant.sets[0]
         return np.asarray(np.linalg.lstsq(-one.a, one.b, rcond=None)[0], dtype=np.float64)
 
-    def _rolling(self, twist: BodyTwist) -> tuple[float, float]:
-        # Wheel rates without slip: those at which the wheels' dampers carry no torque.
+    def _rates_without_slip(self, twist: BodyTwist) -> tuple[float, float]:
+        # The inverse of rolling: those at which the wheels' dampers carry no torque.
         command = self.plant.sets[0].command
         rates = np.array([twist.forward * command.volts_per_speed
                           + sign * twist.yaw * command.volts_per_rate for sign in (-1.0, 1.0)])

@@ -72,6 +72,37 @@ def test_a_base_that_starts_in_motion_follows_what_was_commanded(
         np.testing.assert_allclose(late.column(name), whole.column(name)[-len(late):], atol=0.02)
 
 
+@pytest.mark.parametrize('latency', [0.12, 0.3])
+@pytest.mark.parametrize('names', [('pose',), ('imu', 'pose'), ('wheels', 'pose')])
+def test_a_robot_at_rest_has_its_dead_time_before_it(
+    names: tuple[str, ...], latency: float, paper: NamedPlant,
+) -> None:
+    """Noise is no motion, and a recording may begin with the first command."""
+    model = with_effects(paper.model, ['command_latency'])
+    plant = compile_model(model.structure).at(model.parameters.replacing({'latency': latency}))
+    times: np.ndarray = 0.05 * np.arange(161)
+    commands = TimeSeries(times, np.tile([0.8, 0.0], (161, 1)), ('forward', 'yaw'))
+    truth = rollout(plant, commands, 8.0, 0.01)
+    random = np.random.default_rng(1)
+
+    def seen(columns: tuple[str, ...], deviation: float) -> np.ndarray:
+        values = np.column_stack([np.interp(times, truth.times, truth.column(name))
+                                  for name in columns])
+        return values + random.normal(0.0, deviation, values.shape)
+    streams = {
+        'command': commands,
+        'pose': TimeSeries(times, seen(('x', 'y', 'heading'), 0.002), ('x', 'y', 'heading')),
+        'imu': TimeSeries(times, seen(('yaw_rate', 'accel_x', 'accel_x'), 0.005),
+                          ('yaw_rate', 'accel_x', 'accel_y')),
+        'wheels': TimeSeries(times, seen(('wheel_left', 'wheel_right'), 0.05),
+                             ('left', 'right'))}
+    (segment,) = segments(Recording(
+        'rest', '', {name: streams[name] for name in ('command', *names)}, 0))
+    found = replay(plant, segment)
+    assert np.interp(7.9, found.times, found.column('x')) == pytest.approx(
+        np.interp(7.9, truth.times, truth.column('x')), abs=0.015)
+
+
 def test_the_initial_state_in_motion(
     paper: NamedPlant, drive: Callable[[str], Recording],
 ) -> None:

@@ -15,6 +15,7 @@ from lg_husky_sim.cli.twin import _sides
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
+from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.recording import Recording, write_recording
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.signals import BodyTwist
@@ -89,6 +90,26 @@ def test_stale_command_is_forgotten_as_the_base_does() -> None:
     assert shadow._state.wheel_rates[0] > 1.0
     shadow.gyro(0.9, 0.0)
     assert abs(shadow._state.wheel_rates[0]) < 0.1
+
+
+@pytest.mark.parametrize(('timeout', 'age', 'rate', 'followed'), [
+    (0.5, 14.0, 0.0, False),  # at rest: whatever was said long ago
+    (0.0, 14.0, 0.0, False),
+    (0.5, 14.0, 6.0, False),  # pushed, or braking: the base has forgotten
+    (0.5, 0.2, 6.0, True),
+    (0.0, 14.0, 6.0, True),
+])
+def test_a_model_that_begins_anew_follows_what_the_base_still_does(
+        timeout: float, age: float, rate: float, followed: bool) -> None:
+    model = with_effects(load_model(), ['command_latency'])
+    shadow = Shadow(compile_model(model.structure).at(model.parameters.replacing(
+        {'latency': 0.3})), timeout=timeout)
+    shadow.command(0.0, BodyTwist(1.0, 0.0))
+    shadow.wheels(age, rate, rate)
+    shadow.wheels(age + 0.28, rate, rate)
+    assert shadow._state is not None
+    for simulated in shadow._state.wheel_rates:
+        assert simulated == pytest.approx(6.0 if followed else 0.0, abs=0.7)
 
 
 @pytest.mark.parametrize(('names', 'rates', 'wanted'), [
