@@ -6,26 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import AbstractContextManager
-import multiprocessing
-import signal
+from contextlib import AbstractContextManager, ExitStack
 from types import TracebackType
 from typing import TypeVar
 
-from lg_husky_sim.identification.executor import run_tasks
+from lg_husky_sim.identification.executor import processes, run_tasks
 
 Task = TypeVar('Task')
 Outcome = TypeVar('Outcome')
-
-
-def _begin() -> None:
-    # In a new process. Ctrl-C is for the one who asked; he ends the others.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _load(_: int) -> None:
-    # Import what most tasks need, while the first process still reads and recalibrates.
-    from lg_husky_sim.diagnosis import refits  # noqa: F401
 
 
 class Workers(AbstractContextManager['Workers']):
@@ -47,23 +35,21 @@ class Workers(AbstractContextManager['Workers']):
         """Start nothing yet."""
         self.jobs, self.scheduler = jobs, scheduler
         self._pool: ProcessPoolExecutor | None = None
+        self._ends = ExitStack()
 
     def __enter__(self) -> Workers:
         """Start the processes."""
         if self.jobs > 1 and self.scheduler is None:
-            # Spawned: nothing of this process's threads and state is copied.
-            self._pool = ProcessPoolExecutor(
-                self.jobs, mp_context=multiprocessing.get_context('spawn'), initializer=_begin)
-            for number in range(self.jobs):
-                self._pool.submit(_load, number)
+            # They load while the first process still reads and recalibrates.
+            self._pool = self._ends.enter_context(
+                processes(self.jobs, 'lg_husky_sim.diagnosis.refits'))
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  traceback: TracebackType | None) -> None:
         """End them; what they still do is of no use to anyone."""
-        if self._pool is not None:
-            pool, self._pool = self._pool, None
-            pool.shutdown(wait=kind is None, cancel_futures=True)
+        self._pool = None
+        self._ends.__exit__(kind, error, traceback)
 
     def map(self, function: Callable[[Task], Outcome],  # noqa: A003
             tasks: Sequence[Task]) -> list[Outcome]:

@@ -4,9 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed, ProcessPoolExecutor
+from contextlib import contextmanager
+from importlib import import_module
 import multiprocessing
+import os
+import signal
+import threading
 from typing import Any, TypeVar
 
 from lg_husky_sim.errors import FitError, MissingExtraError
@@ -15,6 +20,55 @@ Task = TypeVar('Task')
 Outcome = TypeVar('Outcome')
 #: Seconds to wait for a scheduler to answer.
 PATIENCE = 10.0
+
+
+def _begin(needed: str) -> None:
+    # In a new process: should the one who asked be killed, it would wait for work for ever.
+    parent = multiprocessing.parent_process()
+
+    def follow() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+    threading.Thread(target=follow, daemon=True).start()
+    if needed:
+        import_module(needed)
+
+
+@contextmanager
+def processes(jobs: int, needed: str = '') -> Iterator[ProcessPoolExecutor]:
+    """
+    Yield processes that take tasks; they end with the block, at once if it fails.
+
+    Parameters
+    ----------
+    jobs : int
+        How many.
+    needed : str, optional
+        Module that they import at once.
+
+    Yields
+    ------
+    concurrent.futures.ProcessPoolExecutor
+        Of spawned processes: nothing of this one's threads and state is copied.
+    """
+    others = multiprocessing.active_children()
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context('spawn'),
+                               initializer=_begin, initargs=(needed,))
+    # Ctrl-C is for the one who asked, who ends the others: they are born deaf to it.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    for _ in range(jobs):
+        pool.submit(os.getpid)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    try:
+        yield pool
+    except BaseException:
+        for child in multiprocessing.active_children():
+            if child not in others:
+                child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: int = 1,
@@ -57,17 +111,11 @@ def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
             done.append(function(task))
             tell()
         return done
-    # Processes are spawned: nothing of this one's threads and state is copied.
-    with ProcessPoolExecutor(min(jobs, len(tasks)),
-                             mp_context=multiprocessing.get_context('spawn')) as pool:
+    with processes(min(jobs, len(tasks))) as pool:
         futures = [pool.submit(function, task) for task in tasks]
-        try:
-            for future in as_completed(futures):
-                future.result()
-                tell()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        for future in as_completed(futures):
+            future.result()
+            tell()
         return [future.result() for future in futures]
 
 
