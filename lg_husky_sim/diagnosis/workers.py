@@ -21,7 +21,7 @@ class Workers(AbstractContextManager['Workers']):
     Where tasks run.
 
     Processes, not threads: only a seventh of a refit runs without the interpreter's lock. They
-    begin with the ``with`` block and end with it.
+    begin with the ``with`` block and end with it; outside of one everything runs in this process.
 
     Parameters
     ----------

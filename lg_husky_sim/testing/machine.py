@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 import os
 import subprocess
 import sys
@@ -25,7 +24,7 @@ def watch(core):
         time.sleep(0.005)
         now = time.monotonic()
         if now - before > 0.007:
-            os.write(1, f'{now} {now - before - 0.005}\\n'.encode())
+            os.write(1, f'{core} {now} {now - before - 0.005}\\n'.encode())
 cores = sorted(os.sched_getaffinity(0))
 for core in cores[1:]:
     threading.Thread(target=watch, args=(core,), daemon=True).start()
@@ -46,7 +45,7 @@ class MachineWatch:
     worst : float
         Longest standstill that still counts as undisturbed [s].
     share : float
-        Largest part of the time that a core may be withheld altogether [-].
+        Largest part of the time for which any core may be withheld altogether [-].
 
     """
 
@@ -101,24 +100,25 @@ class MachineWatch:
         # Not by seeking: reader and writer share one place in the file.
         said = os.pread(self._log.fileno(), os.fstat(self._log.fileno()).st_size, 0)
         whole = said[:said.rfind(b'\n') + 1].decode()
-        rows = [(float(moment), float(late)) for moment, late in (
-            line.split() for line in whole.splitlines())]
-        late = [min(late, moment - begun) for moment, late in rows
-                if moment > begun and moment - late < ended]
-        if late and max(late) > self.worst:
-            return f'a core stood still for {max(late):.2f} s'
-        if sum(late) > self.share * (ended - begun):
-            return f'a core was withheld for {sum(late) / (ended - begun):.0%} of the time'
-        return ''
+        late: dict[str, list[float]] = {}
+        for core, moment, lateness in (line.split() for line in whole.splitlines()):
+            since = max(float(moment) - float(lateness), begun)
+            until = min(float(moment), ended)
+            if until > since:
+                late.setdefault(core, []).append(until - since)
+        longest = max((max(each) for each in late.values()), default=0.0)
+        share = max((sum(each) for each in late.values()), default=0.0) / (ended - begun)
+        if longest > self.worst:
+            return f'a core stood still for {longest:.2f} s'
+        return f'a core was withheld for {share:.0%} of the time' if share > self.share else ''
 
 
 class PatientClock:
     """
-    A plugin of pytest: what fails while the machine was withheld is no verdict on the node.
+    A plugin of pytest: what fails while the machine was withheld is asked again.
 
-    Such a test runs again (by pytest-rerunfailures where that is installed), and if the machine
-    disturbs every time, it is skipped and says so. What fails on an undisturbed machine has
-    failed at once.
+    It needs pytest-rerunfailures to repeat a test. What fails on an undisturbed machine, or every
+    time, has failed.
 
     Parameters
     ----------
@@ -136,11 +136,14 @@ class PatientClock:
         self._marker, self._repeats, self._pause = marker, repeats, pause
         self._watch: MachineWatch | None = None
         self._begun = 0.0
-        self._told = ''
 
     def disturbed(self) -> bool:
-        """Return whether the machine disturbed the last failed test."""
-        return bool(self._told)
+        """Return whether the machine disturbed the test that ended last; no if nobody can tell."""
+        if self._watch is None or not self._watch.watches():
+            return False
+        ended = time.monotonic()
+        time.sleep(0.1)
+        return bool(self._watch.disturbed(self._begun - 0.5, ended))
 
     def pytest_collection_modifyitems(
             self, config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -152,38 +155,13 @@ class PatientClock:
                 if item.get_closest_marker(self._marker):
                     item.add_marker(again)
 
-    @pytest.hookimpl(wrapper=True, tryfirst=True)
-    def pytest_runtest_call(self, item: pytest.Item) -> Generator[None, None, None]:
-        """Note when a test begins."""
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup(self, item: pytest.Item) -> None:
+        """Note when a test begins, its fixtures included."""
         if item.get_closest_marker(self._marker) and self._watch is None:
             self._watch = MachineWatch()
             time.sleep(0.3)
         self._begun = time.monotonic()
-        return (yield)
-
-    @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_makereport(
-            self, item: pytest.Item, call: pytest.CallInfo[None]
-    ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-        """Turn the last failure on a disturbed machine into a skip that names it."""
-        report = yield
-        if (self._watch is None or report.when != 'call' or not report.failed
-                or not item.get_closest_marker(self._marker)):
-            return report
-        ended = time.monotonic()
-        time.sleep(0.1)
-        # Where nobody can watch, such as beside Linux, a failure is a failure.
-        self._told = self._watch.disturbed(
-            self._begun - 0.5, ended) if self._watch.watches() else ''
-        # The plugin that repeats counts from 1; without it the first failure is the last.
-        tries = getattr(item, 'execution_count', 1)
-        if self._told and (tries > self._repeats or not hasattr(item, 'execution_count')):
-            path, line, _ = item.location
-            why = call.excinfo.exconly() if call.excinfo else ''
-            report.outcome = 'skipped'
-            report.longrepr = (path, (line or 0) + 1, (
-                f'not judged: {self._told} when it failed, {tries} times: {why}'))
-        return report
 
     def pytest_unconfigure(self) -> None:
         """End the watch."""

@@ -15,6 +15,7 @@ from lg_husky_sim.proof import catalogue, plan
 from lg_husky_sim.proof.bags import read_bag
 from lg_husky_sim.proof.cases import choose, generate, Spec
 from lg_husky_sim.proof.sealing import commitment, seal, unseal
+from lg_husky_sim.recording import read_recording
 import numpy as np
 import pytest
 
@@ -75,6 +76,10 @@ def test_another_seed_gives_another_robot(single: Path, tmp_path: Path) -> None:
     other = json.loads((tmp_path / 'answers/case_0001.json').read_text())
     assert one['robot']['mass'] != other['robot']['mass']
     assert one['salt'] != other['salt']
+    # The date tells nothing of the seed.
+    bags = [read_recording(folder / 'cases/case_0001/recordings/rec1')
+            for folder in (single, tmp_path)]
+    assert abs(bags[0].start_ns - bags[1].start_ns) < 10**9
 
 
 def test_a_bag_has_the_husky_s_topics_rates_and_consistent_motion(single: Path) -> None:

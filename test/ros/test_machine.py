@@ -44,7 +44,7 @@ def test_of_another_kind():
     (['late'], 2, True, True, '2 passed, 1 rerun'),
     (['late'], 3, True, True, '1 failed, 1 passed, 1 rerun'),
     (['late'], 2, True, False, '1 failed, 1 passed'),
-    (['late'] * 3, 9, True, True, '1 passed, 1 skipped, 2 rerun'),
+    (['late'] * 3, 9, True, True, '1 failed, 1 passed, 2 rerun'),
     (['late'] * 3, 1, False, True, '1 failed, 1 passed'),
 ])
 def test_failures_on_a_disturbed_machine_are_asked_again(
@@ -61,12 +61,11 @@ def test_failures_on_a_disturbed_machine_are_asked_again(
         capture_output=True, text=True, timeout=120.0, check=False)
     assert f'= {wanted} in ' in ran.stdout, ran.stdout
     assert ran.returncode == ('failed' in wanted)
-    assert ('not judged: late when it failed, 3 times' in ran.stdout) == ('skipped' in wanted)
 
 
 @pytest.mark.realtime
 def test_a_standstill_is_noticed_and_belongs_to_its_time() -> None:
-    with MachineWatch(worst=0.4, share=9.0) as watch:
+    with MachineWatch(worst=0.4, share=1.0) as watch:
         time.sleep(0.5)
         begun = time.monotonic()
         time.sleep(0.5)
