@@ -29,10 +29,11 @@ EXTRAS = {
     'scale': ['dask[distributed]>=2024.1'],
     'search': ['deap>=1.4'],
     'report': ['jinja2>=3.1'],
+    'tables': ['control>=0.10', 'pandas>=2.0'],
 }
 EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report', 'search')
                  for need in EXTRAS[extra]]
-EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale']]
+EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale'], *EXTRAS['tables']]
 EXTRAS['test'] = ['hypothesis>=6.100', 'pytest>=8', 'pytest-rerunfailures>=16.7',
                   'pytest-xdist>=3.5', 'setuptools>=70.1']
 EXTRAS['dev'] = [

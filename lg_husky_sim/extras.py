@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from lg_husky_sim.errors import MissingExtraError
 
 EXTRA_OF = {
+    'control': 'tables',
     'cyclonedds': 'dds',
     'dask': 'scale',
     'deap': 'search',
@@ -17,6 +18,7 @@ EXTRA_OF = {
     'matplotlib': 'plot',
     'mujoco': 'engine',
     'numba': 'fast',
+    'pandas': 'tables',
     'rosbags': 'bags',
 }
 """Importable module to the extra of setup.py that brings it."""

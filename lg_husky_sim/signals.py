@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from lg_husky_sim.errors import RecordingError
+from lg_husky_sim.extras import require
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -122,3 +124,48 @@ class TimeSeries:
         first = int(np.searchsorted(self.times, start, side='left'))
         last = int(np.searchsorted(self.times, end, side='right'))
         return TimeSeries(self.times[first:last], self.values[first:last], self.names)
+
+    def to_pandas(self) -> Any:
+        """
+        Return the samples as a pandas DataFrame.
+
+        Returns
+        -------
+        pandas.DataFrame, shape (n_times, n_channels)
+            Index ``time`` [s], one column a channel.
+
+        Raises
+        ------
+        MissingExtraError
+            If pandas is not installed.
+        """
+        require('pandas', 'make a DataFrame')
+        import pandas as pd
+
+        return pd.DataFrame(self.values.copy(), index=pd.Index(self.times.copy(), name='time'),
+                            columns=list(self.names))
+
+    def plot(self, ax: Any = None, **style: Any) -> Any:
+        """
+        Draw every channel over time.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current axes if not given.
+        **style
+            Passed on to ``Axes.plot``.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        require('matplotlib', 'draw figures')
+        if ax is None:
+            from matplotlib import pyplot
+            ax = pyplot.gca()
+        for name in self.names:
+            ax.plot(self.times, self.column(name), **{'label': name, **style})
+        ax.set_xlabel('time [s]')
+        ax.legend()
+        return ax

@@ -162,7 +162,7 @@ def channel_errors(segment: Segment, prediction: TimeSeries) -> dict[str, Square
         Keys in the order of ``UNITS``; wheel_speed pools both sides, position both axes (its
         root mean square is that of the distance).
     """
-    from_pose = _pose_rates(segment, prediction)
+    from_pose = pose_rates(segment, prediction)
     errors: dict[str, FloatArray] = {}
     for name, series in measured_channels(segment).items():
         derived = name == 'forward' or (name == 'yaw_rate' and 'imu' not in segment.streams)
@@ -226,7 +226,7 @@ def _single(series: TimeSeries, name: str, channel: str) -> TimeSeries:
     return TimeSeries(series.times, series.column(name)[:, None], (channel,))
 
 
-def _pose_rates(segment: Segment, prediction: TimeSeries) -> TimeSeries:
+def pose_rates(segment: Segment, prediction: TimeSeries) -> TimeSeries:
     """Return rates derived from the predicted pose just as the measured ones are."""
     if 'pose' not in segment.streams:
         return prediction

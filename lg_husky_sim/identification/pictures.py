@@ -75,7 +75,7 @@ def certainty_figure(result: FitResult) -> Figure:
     with rc_context(STYLE):
         figure = Figure(figsize=(11.0, 2.0 + 0.42 * count), layout='constrained')
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
-        _draw_intervals(left, result.estimates)
+        draw_intervals(left, result.estimates)
         right.grid(visible=False)
         image = right.imshow(result.correlation, cmap='RdBu_r', vmin=-1.0, vmax=1.0)
         for i in range(count):
@@ -120,7 +120,7 @@ def profile_figure(profiles: Sequence[Profile]) -> Figure:
     return figure
 
 
-def _draw_intervals(axes: Axes, estimates: Sequence[Estimated]) -> None:
+def draw_intervals(axes: Axes, estimates: Sequence[Estimated]) -> None:
     for row, one in enumerate(estimates):
         scale = max(abs(one.value), 1e-12)
         low, high = (one.low - one.value) / scale, (one.high - one.value) / scale

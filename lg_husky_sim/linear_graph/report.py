@@ -159,5 +159,16 @@ def latex_report(title: str, steps: Equations, model: SymbolicStateSpace,
     return '\n'.join(parts)
 
 
+def state_equation_latex(model: SymbolicStateSpace) -> str:
+    """Return dx/dt = A x + B u as one formula of LaTeX, without delimiters."""
+    import sympy
+
+    a, b = (sympy.latex(matrix, mat_str='bmatrix', mat_delim='', symbol_names={
+        symbol: latex_of(symbol.name) for symbol in matrix.free_symbols})
+        for matrix in (model.A, model.B))
+    return (rf'\frac{{d}}{{dt}} {_column(model.states)} = {a} {_column(model.states)}'
+            rf' + {b} {_column(model.inputs)}')
+
+
 def _column(names: tuple[str, ...]) -> str:
     return r'\begin{bmatrix} ' + r' \\ '.join(latex_of(n) for n in names) + r' \end{bmatrix}'

@@ -94,6 +94,36 @@ def open_bag(path: Path) -> Iterator[Bag]:
         raise RecordingError(f'cannot read {path}: {_reason(error)}{_advice(files)}') from error
 
 
+def bags_in(path: Path) -> list[Path]:
+    """
+    Return the bags that a path stands for.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        A bag, or a folder of bags.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The bag itself, whether or not it can be read; of a folder that is no bag, those in it,
+        sorted by name: rosbag2 folders, and ROS 1 files where there are several.
+    """
+    if not path.is_dir() or _is_bag2(path):
+        return [path]
+    parts = sorted(path.iterdir())
+    ros1 = [part for part in parts if part.suffix == '.bag' and part.is_file()]
+    inside = [part for part in parts if part.is_dir() and _is_bag2(part)]
+    if len(ros1) > 1:
+        inside = sorted([*inside, *ros1])
+    return inside or [path]
+
+
+def _is_bag2(folder: Path) -> bool:
+    return (folder / 'metadata.yaml').is_file() or any(
+        part.suffix in ('.mcap', '.db3') and part.is_file() for part in folder.iterdir())
+
+
 def _files(path: Path) -> list[Path]:
     """Return what to open for a path that the user named."""
     if not path.exists():

@@ -107,13 +107,37 @@ class Messages:
 
         def make(place: int, stamp: int) -> Any:
             x, y, heading = series.values[place]
-            turn = self._new('geometry_msgs/msg/Quaternion', 0.0, 0.0,
-                             float(np.sin(heading / 2.0)), float(np.cos(heading / 2.0)))
-            transform = self._new('geometry_msgs/msg/Transform', self._vector(x, y), turn)
+            transform = self._new('geometry_msgs/msg/Transform', self._vector(x, y),
+                                  self._quaternion(heading))
             return self._new(kind, [self._new(
                 'geometry_msgs/msg/TransformStamped', self._header(stamp, parent), child,
                 transform)])
         return '/tf', kind, series.times, make
+
+    def number(self, topic: str, series: TimeSeries) -> Maker:
+        """Return a maker of plain numbers, the series' first channel."""
+        kind = 'std_msgs/msg/Float64'
+        values = series.values[:, 0]
+
+        def make(place: int, stamp: int) -> Any:
+            return self._new(kind, float(values[place]))
+        return topic, kind, series.times, make
+
+    def posed(self, topic: str, series: TimeSeries) -> Maker:
+        """Return a maker of poses from x, y and heading."""
+        kind = 'geometry_msgs/msg/PoseStamped'
+
+        def make(place: int, stamp: int) -> Any:
+            x, y, heading = (float(value) for value in series.values[place])
+            pose = self._new(
+                'geometry_msgs/msg/Pose', self._new('geometry_msgs/msg/Point', x, y, 0.0),
+                self._quaternion(heading))
+            return self._new(kind, self._header(stamp, self._frames[0]), pose)
+        return topic, kind, series.times, make
+
+    def _quaternion(self, heading: float) -> Any:
+        return self._new('geometry_msgs/msg/Quaternion', 0.0, 0.0,
+                         float(np.sin(heading / 2.0)), float(np.cos(heading / 2.0)))
 
     def _current(self, series: TimeSeries, side: str) -> Maker:
         kind = 'std_msgs/msg/Float32'

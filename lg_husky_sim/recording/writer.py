@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 import heapq
 from os import PathLike, replace
 from pathlib import Path
@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.extras import require
-from lg_husky_sim.recording.messages import Messages
+from lg_husky_sim.recording.messages import Maker, Messages
 from lg_husky_sim.recording.recording import check_stream
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
+    from rosbags.typesys.store import Typestore
 
 STORAGES = ('mcap', 'sqlite3')
 START_NS = 1_700_000_000_000_000_000
@@ -70,17 +71,72 @@ def write_recording(
     MissingExtraError
         If the package `rosbags` is not installed.
     """
-    target = Path(path)
-    if storage not in STORAGES:
-        raise RecordingError(f'storage {storage!r} is unknown; there are {", ".join(STORAGES)}')
     for name, series in streams.items():
         check_stream(name, series)
+    return _whole(Path(path), lambda store: Messages(store, frames).makers(streams), storage,
+                  start_ns, overwrite)
+
+
+def write_signals(
+    path: str | PathLike[str],
+    signals: Mapping[str, TimeSeries],
+    poses: Mapping[str, TimeSeries],
+    *,
+    storage: str = 'mcap',
+    start_ns: int = START_NS,
+    frame: str = 'odom',
+    overwrite: bool = False,
+) -> Path:
+    """
+    Write a rosbag2 of plain signals, for tools that plot.
+
+    Parameters
+    ----------
+    path : path-like
+        Folder to make.
+    signals : mapping of str to TimeSeries
+        By topic (std_msgs/Float64), one channel each; times [s] since `start_ns`.
+    poses : mapping of str to TimeSeries
+        By topic (geometry_msgs/PoseStamped); names x, y [m], heading [rad].
+    storage : str
+        ``mcap`` or ``sqlite3``.
+    start_ns : int
+        Time zero [ns].
+    frame : str
+        Of the poses.
+    overwrite : bool
+        Replace a rosbag2 that is at `path`; anything else there is never touched.
+
+    Returns
+    -------
+    pathlib.Path
+        The folder.
+
+    Raises
+    ------
+    RecordingError
+        If something is at `path` already, or the storage is unknown.
+    MissingExtraError
+        If the package `rosbags` is not installed.
+    """
+    def makers(store: Typestore) -> list[Maker]:
+        messages = Messages(store, (frame, ''))
+        return [*(messages.number(topic, series) for topic, series in signals.items()),
+                *(messages.posed(topic, series) for topic, series in poses.items())]
+    return _whole(Path(path), makers, storage, start_ns, overwrite)
+
+
+def _whole(target: Path, makers: Callable[[Typestore], list[Maker]], storage: str,
+           start_ns: int, overwrite: bool) -> Path:
+    """Write a bag under another name first, so that it appears whole or not at all."""
+    if storage not in STORAGES:
+        raise RecordingError(f'storage {storage!r} is unknown; there are {", ".join(STORAGES)}')
     check_target(target, overwrite=overwrite)
     require('rosbags', 'write recordings')
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=target.parent) as scratch:
         made = Path(scratch) / target.name  # files inside a bag carry the bag's name
-        _write(made, streams, storage, start_ns, frames)
+        _write(made, makers, storage, start_ns)
         if target.exists():
             check_target(target, overwrite=overwrite)
             replace(target, Path(scratch) / 'previous')
@@ -105,10 +161,8 @@ def check_target(path: Path, *, overwrite: bool = False) -> None:
         raise RecordingError(f'{path} exists and is no rosbag2; it is not overwritten')
 
 
-def _write(
-    path: Path, streams: Mapping[str, TimeSeries], storage: str, start_ns: int,
-    frames: tuple[str, str],
-) -> None:
+def _write(path: Path, makers: Callable[[Typestore], list[Maker]], storage: str, start_ns: int
+           ) -> None:
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
     from rosbags.typesys import get_typestore, Stores
 
@@ -118,12 +172,12 @@ def _write(
     if plugin is StoragePlugin.MCAP:  # a fifth of the size; rosbag2 reads it as it is
         writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     with writer:
-        makers = Messages(store, frames).makers(streams)
+        made = makers(store)
         connections: list[Connection] = [
-            writer.add_connection(topic, kind, typestore=store) for topic, kind, _, _ in makers]
-        rows = [_rows(place, times, start_ns) for place, (_, _, times, _) in enumerate(makers)]
+            writer.add_connection(topic, kind, typestore=store) for topic, kind, _, _ in made]
+        rows = [_rows(place, times, start_ns) for place, (_, _, times, _) in enumerate(made)]
         for stamp, place, index in heapq.merge(*rows):
-            _, kind, _, make = makers[place]
+            _, kind, _, make = made[place]
             raw = store.serialize_cdr(make(index, stamp), kind)
             writer.write(connections[place], stamp, raw)
 

@@ -1,0 +1,307 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings beside models: errors, pictures, page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+import os
+from pathlib import Path
+import tempfile
+from typing import Any, TypeAlias
+
+from lg_husky_sim import recording as rec
+from lg_husky_sim.api.progress import Report, Shown, shown
+from lg_husky_sim.api.recordings import PathLike, read_all, Recordings, Topics
+from lg_husky_sim.api.robots import as_husky, Husky
+from lg_husky_sim.api.tables import page_part, Table
+from lg_husky_sim.comparison.metrics import UNITS
+from lg_husky_sim.comparison.models import NamedPlant, plants_in, recordings_of, unique_labels
+from lg_husky_sim.comparison.outcome import (
+    as_json,
+    compare_recording,
+    labels,
+    RecordingOutcome,
+    text_table,
+)
+from lg_husky_sim.errors import CommandError
+from lg_husky_sim.extras import require
+from lg_husky_sim.folders import result_folder
+from lg_husky_sim.husky.model_file import default_model_path
+from lg_husky_sim.recording.names import printable
+import numpy as np
+
+Model: TypeAlias = PathLike | Husky
+Models: TypeAlias = Model | Sequence[Model] | Mapping[str, Model] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """
+    Recordings beside the predictions of models.
+
+    Errors are measured minus predicted. Made by :func:`compare`.
+
+    Parameters
+    ----------
+    outcomes : tuple of RecordingOutcome
+        One a recording, with its segments and the predictions in them.
+    plants : tuple of NamedPlant
+        The models with their labels.
+    horizon : float
+        Time after which each prediction started anew [s]; 0 only at gaps.
+    settings : mapping of str to float
+        Parameters that were overridden in every model.
+    """
+
+    outcomes: tuple[RecordingOutcome, ...]
+    plants: tuple[NamedPlant, ...]
+    horizon: float
+    settings: Mapping[str, float]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the models, and of other simulators beside them."""
+        return labels(self.outcomes)
+
+    def table(self) -> Table:
+        """Return the errors: one row a recording and quantity, one column a model."""
+        rows: list[tuple[object, ...]] = []
+        for outcome in self.outcomes:
+            errors = {name: outcome.errors(name) for name in self.labels}
+            name = outcome.recording.name
+            for channel, unit in UNITS.items():
+                values = [errors[label][channel].rmse if channel in errors[label] else None
+                          for label in self.labels]
+                if any(value is not None for value in values):
+                    rows.append((name, f'{channel} RMS error', unit, *values))
+            for place, axis in enumerate('XY'):
+                bounds = [outcome.bounds(label)[place] for label in self.labels]
+                if any(map(math.isfinite, bounds)):
+                    rows.append((name, f'largest |{axis}| error', 'm', *bounds))
+        return Table('', ('recording', 'quantity', 'unit', *self.labels), tuple(rows))
+
+    def to_pandas(self) -> Any:
+        """Return the errors as a pandas DataFrame, index recording and quantity."""
+        return self.table().to_pandas().set_index(['recording', 'quantity'])
+
+    def data(self) -> dict[str, object]:
+        """Return the comparison as plain data, schema ``lg_husky_sim/comparison/1``."""
+        return as_json(self.outcomes, self.plants, self.horizon, self.settings)
+
+    def plot(self, axes: Sequence[Any] | None = None, recording: int = 0) -> Any:
+        """
+        Draw path, forward speed, right wheel rate and yaw rate of the longest segment.
+
+        Parameters
+        ----------
+        axes : sequence of four matplotlib Axes, optional
+            Where to draw; a new figure if not given.
+        recording : int
+            Which of the recordings.
+
+        Returns
+        -------
+        numpy.ndarray of matplotlib Axes, shape (4,)
+        """
+        require('matplotlib', 'draw figures')
+        from lg_husky_sim.comparison.figures import draw_response, draw_trajectory, line_styles
+        from lg_husky_sim.comparison.metrics import measured_channels
+
+        if axes is None:
+            from matplotlib import pyplot
+            _, grid = pyplot.subplots(2, 2, figsize=(10.0, 6.5), layout='constrained')
+            axes = list(grid.flat)
+        if len(axes) != 4:
+            raise CommandError(f'{len(axes)} axes given; a comparison is drawn into 4')
+        outcome = self.outcomes[recording]
+        part = max(outcome.segments, key=lambda one: one.segment.duration)
+        styles = line_styles(self.labels)
+        if part.tracks:
+            draw_trajectory(axes[0], part.tracks, styles)
+        measured = measured_channels(part.segment)
+        for axis, channel in zip(axes[1:], ('forward', 'wheel_right', 'yaw_rate'), strict=True):
+            draw_response(axis, measured.get(channel), part.predictions, channel, styles,
+                          part.segment.start)
+            axis.set_xlabel('time [s]')
+        axes[0].legend()
+        return np.array(list(axes), dtype=object)
+
+    def save(self, folder: PathLike, figures: int = 6, progress: Report | None = None) -> Path:
+        """
+        Write index.html, compare.json, compare.txt and the pictures.
+
+        Parameters
+        ----------
+        folder : path-like
+            Made, or files of an earlier run in it replaced.
+        figures : int
+            Segments of each recording that get pictures, the longest ones.
+        progress : callable, optional
+
+        Returns
+        -------
+        pathlib.Path
+            The page.
+        """
+        from lg_husky_sim.comparison.page import MARKER, pictured, write_files
+
+        target = Path(folder)
+        total = sum(1 for outcome in self.outcomes for _ in pictured(outcome, figures))
+        drawn = iter(range(total))
+
+        def each() -> None:
+            if progress is not None:
+                progress('drawing', (next(drawn, total) + 1) / max(total, 1))
+        with result_folder(target, MARKER) as made:
+            write_files(made, self.outcomes, self.plants, self.horizon, figures, self.settings,
+                        each)
+        return target / 'index.html'
+
+    def save_bag(self, path: PathLike, *, recording: int = 0, overwrite: bool = False) -> Path:
+        """
+        Write measured, predicted and residual of a recording as one rosbag2, to be plotted.
+
+        Beside it stand ``PATH.foxglove.json`` and ``PATH.plotjuggler.xml``, layouts for both.
+
+        Parameters
+        ----------
+        path : path-like
+            Folder of the rosbag2.
+        recording : int
+            Which of the recordings.
+        overwrite : bool
+            Replace a rosbag2 that is there.
+
+        Returns
+        -------
+        pathlib.Path
+            The folder.
+        """
+        from lg_husky_sim.comparison.signals_bag import write_comparison_bag
+        return write_comparison_bag(Path(path), self.outcomes[recording], overwrite)
+
+    def save_trajectories(self, folder: PathLike) -> tuple[Path, ...]:
+        """
+        Write measured and predicted trajectories in the TUM format, which evo reads.
+
+        Parameters
+        ----------
+        folder : path-like
+            Gets ``RECORDING.tum`` and ``RECORDING_MODEL.tum`` for each recording with a pose.
+
+        Returns
+        -------
+        tuple of pathlib.Path
+        """
+        from lg_husky_sim.comparison.signals_bag import write_trajectories
+        return tuple(path for outcome in self.outcomes
+                     for path in write_trajectories(Path(folder), outcome))
+
+    def report(self, folder: PathLike | None = None) -> Path:
+        """Write everything into a folder, a temporary one by default; return the page."""
+        return self.save(folder or tempfile.mkdtemp(prefix='lg_husky_compare.'))
+
+    def __str__(self) -> str:
+        """Return the errors as text."""
+        return text_table(self.outcomes)
+
+    def _repr_html_(self) -> str:
+        return page_part('Comparison', ['Errors are measured minus predicted.'], [self.table()], {
+            'Notes': [note for outcome in self.outcomes
+                      for note in (*outcome.recording.notes, *outcome.gaps())]})
+
+
+def compare(recordings: Recordings, models: Models = None, *, rivals: Recordings = (),
+            horizon: float = 0.0, settings: Mapping[str, float] | None = None,
+            topics: Topics = None, progress: Shown = True) -> Comparison:
+    """
+    Replay the commands of recordings through models and measure how far they are apart.
+
+    Each segment without a gap starts in the state that the robot was in.
+
+    Parameters
+    ----------
+    recordings : path-like, Recording, or several of them
+        In the order in which they were driven.
+    models : Husky or path-like, or several of them, optional
+        A mapping gives them labels; the packaged Husky by default.
+    rivals : path-like, Recording, or several of them
+        Another simulator's recording of the same drive, one for each recording.
+    horizon : float
+        Start anew from the measured state after so many seconds; 0 only at gaps.
+    settings : mapping of str to float, optional
+        Physical parameters overridden in every model [SI].
+    topics : mapping of str to str, optional
+        Topics of the recordings chosen by hand.
+    progress : bool or callable
+        Shown in terminals and notebooks; False for none.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    CommandError
+        If the horizon is negative, or there is not one rival for each recording.
+    RecordingError
+        If a recording cannot be used.
+    """
+    if not 0.0 <= horizon < math.inf:
+        raise CommandError(f'horizon = {horizon:g} s must be 0 or positive')
+    overridden = dict(settings or {})
+    plants = _named(models, overridden)
+    with shown(progress) as report:
+        beside = read_all(rivals, progress=report)
+        read, = rec.named_apart(rec.named_as_in(
+            read_all(recordings, topics=topics, progress=report), recordings_of(plants)))
+        if beside and len(beside) != len(read):
+            raise CommandError(f'{len(beside)} rivals for {len(read)} recordings: give one '
+                               'for each recording, in their order, or none')
+        names = [one.name for one in read]
+        outcomes = []
+        for place, one in enumerate(read):
+            report(f'replaying {one.name}', place / len(read))
+            rival = None
+            if beside:
+                rival = (_rival_label(beside, place, [named.label for named in plants]),
+                         beside[place])
+            outcomes.append(compare_recording(
+                one, plants_in(plants, one.name, names), rival, horizon))
+    return Comparison(tuple(outcomes), plants, horizon, overridden)
+
+
+def _named(models: Models, settings: Mapping[str, float]) -> tuple[NamedPlant, ...]:
+    if isinstance(models, Mapping):
+        given = dict(models)
+    else:
+        several: Sequence[Model | None] = [models] if models is None or isinstance(
+            models, (str, os.PathLike, Husky)) else models
+        paths = [_path_of(model) for model in several]
+        given = dict(zip(unique_labels(paths), several, strict=True))  # type: ignore[arg-type]
+        if not settings:
+            given = {('paper' if path == default_model_path() else label): model for
+                     path, (label, model) in zip(paths, given.items(), strict=True)}
+    found = []
+    for label, model in given.items():
+        husky = Husky(as_husky(model), **settings)
+        found.append(NamedPlant(label, str(_path_of(model)), husky.model, husky.plant))
+    return tuple(found)
+
+
+def _path_of(model: Model | None) -> Path:
+    # A model that was made in Python has no file; it gets a name all the same.
+    if isinstance(model, Husky):
+        if model.path:
+            return Path(model.path)
+        return default_model_path() if model.model == Husky().model else Path('model')
+    return default_model_path() if model is None else Path(model)
+
+
+def _rival_label(rivals: Sequence[rec.Recording], place: int, taken: Sequence[str]) -> str:
+    # One name for all, so that they are pooled, and no model's.
+    label = printable('rival' if len(rivals) > 1 else Path(rivals[place].name).stem)
+    return f'{label} (rival)' if label in taken else label

@@ -1,0 +1,181 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Missing physics as a value with tables, pictures and files: the one door to the diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import tempfile
+from typing import Any, TYPE_CHECKING
+
+from lg_husky_sim.api.progress import Shown, shown
+from lg_husky_sim.api.recordings import PathLike, read_all, Recording, Recordings, Topics
+from lg_husky_sim.api.robots import Husky
+from lg_husky_sim.api.tables import page_part, Table
+from lg_husky_sim.folders import result_folder
+
+if TYPE_CHECKING:
+    from lg_husky_sim.api.comparing import Comparison
+    from lg_husky_sim.diagnosis.diagnose import Case
+    from lg_husky_sim.diagnosis.result import Diagnosis, Finding
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisResult:
+    """
+    Which physics a model lacks. Made by :meth:`Husky.diagnose`.
+
+    Parameters
+    ----------
+    case : Case
+        The diagnosis with what it was made from.
+    recordings : tuple of Recording
+    before : Husky
+        The model in doubt.
+    """
+
+    case: Case
+    recordings: tuple[Recording, ...]
+    before: Husky
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """The whole answer as a value."""
+        return self.case.diagnosis
+
+    @property
+    def verdict(self) -> str:
+        """``nothing_missing``, ``known`` or ``unknown``."""
+        return self.diagnosis.verdict.value
+
+    @property
+    def confidence(self) -> float:
+        """Probability that verdict and first name are right (0 to 1)."""
+        return self.diagnosis.confidence
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is missing: effect, side, numbers with intervals, a sentence."""
+        return self.diagnosis.findings
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        from lg_husky_sim.diagnosis.output import headline
+        return headline(self.diagnosis)
+
+    @property
+    def husky(self) -> Husky:
+        """The model recalibrated, with what was found."""
+        return Husky(self.diagnosis.model)
+
+    @property
+    def recalibrated(self) -> Husky:
+        """The model recalibrated only."""
+        return Husky(self.diagnosis.plain_model)
+
+    def table(self) -> Table:
+        """Return the findings' numbers with their 95 % intervals."""
+        rows: list[tuple[object, ...]] = []
+        for finding in self.findings:
+            for one in finding.parameters:
+                rows.append((finding.effect, finding.side, one.name, one.value, one.low,
+                             one.high, one.unit))
+            if not finding.parameters:
+                rows.append((finding.effect, finding.side, '', None, None, None, ''))
+        return Table('', ('effect', 'side', 'parameter', 'value', 'low', 'high', 'unit'),
+                     tuple(rows))
+
+    def errors(self) -> Table:
+        """Return the errors on held-out data, recalibrated and with the finding."""
+        before, after = self.diagnosis.held_out_plain, self.diagnosis.held_out_augmented
+        return Table('', ('held-out error', 'recalibrated', 'with finding'), tuple(
+            (name, before.get(name), after.get(name)) for name in dict.fromkeys((*before, *after))
+            if isinstance(before.get(name, 0.0), float)))
+
+    def to_pandas(self) -> Any:
+        """Return the findings' numbers as a pandas DataFrame."""
+        return self.table().to_pandas()
+
+    def data(self) -> dict[str, Any]:
+        """Return the diagnosis as plain data, schema ``lg_husky_sim/diagnosis/1``."""
+        from lg_husky_sim.diagnosis.result import diagnosis_data
+        return diagnosis_data(self.diagnosis)
+
+    def compare(self) -> Comparison:
+        """Return the recordings beside the nominal, the recalibrated and the found model."""
+        from lg_husky_sim.api.comparing import compare
+        return compare(self.recordings, {'nominal': self.before, 'recalibrated':
+                       self.recalibrated, 'with finding': self.husky}, progress=False)
+
+    def plot(self, axes: Any = None, recording: int = 0) -> Any:
+        """
+        Draw a recording: measured, nominal, recalibrated, with the finding.
+
+        Parameters
+        ----------
+        axes : sequence of four matplotlib Axes, optional
+            Where to draw; a new figure if not given.
+        recording : int
+            Which of the recordings.
+
+        Returns
+        -------
+        numpy.ndarray of matplotlib Axes, shape (4,)
+        """
+        return self.compare().plot(axes, recording)
+
+    def save(self, folder: PathLike, report: bool = True) -> Path:
+        """
+        Write diagnosis.json, model.yaml, plain.yaml, diagnosis.txt, and the report.
+
+        Parameters
+        ----------
+        folder : path-like
+            Made, or files of an earlier run in it replaced.
+        report : bool
+            Whether to write report.html and the pictures too.
+
+        Returns
+        -------
+        pathlib.Path
+            The report, or diagnosis.json without one.
+        """
+        from lg_husky_sim.diagnosis.output import MARKER, write_files
+
+        target = Path(folder)
+        with result_folder(target, MARKER) as made:
+            write_files(made, self.case, report)
+        return target / ('report.html' if report else MARKER)
+
+    def report(self, folder: PathLike | None = None) -> Path:
+        """Write everything into a folder, a temporary one by default; return the page."""
+        return self.save(folder or tempfile.mkdtemp(prefix='lg_husky_diagnosis.'))
+
+    def __str__(self) -> str:
+        """Return the answer as text."""
+        from lg_husky_sim.diagnosis.output import summary_text
+        return summary_text(self.diagnosis)
+
+    def _repr_html_(self) -> str:
+        return page_part(
+            self.headline, [f'Confidence {self.confidence:.2f}',
+                            *(finding.statement for finding in self.findings)],
+            [self.table(), self.errors()], {'Notes': self.diagnosis.notes})
+
+
+def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),
+             jobs: int | None = None, scheduler: str | None = None, topics: Topics = None,
+             progress: Shown = True) -> DiagnosisResult:
+    """Say which physics a model lacks; see :meth:`lg_husky_sim.Husky.diagnose`."""
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # each process has its own core
+    from lg_husky_sim.diagnosis.diagnose import diagnose as run
+    from lg_husky_sim.diagnosis.workers import Workers
+
+    with shown(progress) as report, Workers(jobs or 1, scheduler) as workers:
+        after = read_all(recordings, topics=topics, progress=lambda stage, _: report(stage, 0.0))
+        before = read_all(baseline, topics=topics, progress=lambda stage, _: report(stage, 0.0))
+        case = run(after, husky.model, report, before, workers)
+    return DiagnosisResult(case, tuple(after), husky)

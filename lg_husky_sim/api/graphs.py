@@ -1,0 +1,256 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Linear graphs with their matrices, in symbols and in numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+import os
+from pathlib import Path
+from typing import Any
+
+from lg_husky_sim.api.tables import page_part, Table
+from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.linear_graph import (
+    compile_numeric,
+    derive,
+    LinearGraph,
+    StateSpace,
+    SymbolicStateSpace,
+)
+from lg_husky_sim.linear_graph.netlist import parse_netlist, read_netlist
+
+
+class Graph:
+    """
+    A linear graph and the state-space model that follows from it.
+
+    dx/dt = A x + B u, y = C x + D u (and E, F, G, … where inputs are differentiated or laws are
+    not linear, see :class:`~lg_husky_sim.linear_graph.StateSpace`).
+
+    Parameters
+    ----------
+    name : str
+        Title.
+    graph : LinearGraph
+        Branches and two-ports.
+    values : mapping of str to float
+        Numbers of the parameters, SI; those that are missing stay symbols.
+    outputs : sequence of str
+        Variables to put out, such as ``'v(M_H)'``.
+    note : str
+        What to say of the matrices.
+    """
+
+    def __init__(self, name: str, graph: LinearGraph, values: Mapping[str, float],
+                 outputs: Sequence[str] = (), note: str = '') -> None:
+        """Keep what the matrices are derived from when they are first asked for."""
+        self.name, self.graph, self.values = name, graph, dict(values)
+        self.outputs, self.note = tuple(outputs), note
+
+    @cached_property
+    def symbolic(self) -> SymbolicStateSpace:
+        """The model in symbols, each element's value under the element's own name."""
+        return derive(self.graph, self.outputs, by_element=True)
+
+    @property
+    def A(self) -> Any:
+        """State matrix in symbols, a ``sympy.Matrix`` of shape (n, n)."""
+        return self.symbolic.A
+
+    @property
+    def B(self) -> Any:
+        """Input matrix in symbols, a ``sympy.Matrix`` of shape (n, m)."""
+        return self.symbolic.B
+
+    @property
+    def C(self) -> Any:
+        """Output matrix in symbols, a ``sympy.Matrix`` of shape (p, n)."""
+        return self.symbolic.C
+
+    @property
+    def D(self) -> Any:
+        """Feed-through in symbols, a ``sympy.Matrix`` of shape (p, m)."""
+        return self.symbolic.D
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states, such as ``omega(J_1)``."""
+        return self.symbolic.states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.symbolic.inputs
+
+    def numeric(self, **values: float) -> StateSpace:
+        """
+        Return the model in numbers.
+
+        Parameters
+        ----------
+        **values : float
+            Parameters by name, SI, in place of the graph's own.
+
+        Returns
+        -------
+        StateSpace
+            ``A``, ``B``, ``C``, ``D`` as arrays, names of states, inputs and outputs, ``poles``.
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is unknown, has no number, or one that is not allowed.
+        """
+        model = compile_numeric(self.graph, self.outputs, chained=True)
+        for name in values:
+            if name not in (*self.values, *model.parameters):
+                raise ParameterError(f'unknown parameter {name!r} '
+                                     f'(known: {", ".join(model.parameters)})')
+        return model.at({**self.values, **values})
+
+    def text(self, by_parameter: bool = False) -> str:
+        """
+        Return every step of the derivation as text.
+
+        Parameters
+        ----------
+        by_parameter : bool
+            Write the parameters' expressions instead of the elements' names.
+        """
+        from lg_husky_sim.linear_graph.equations import equations
+        from lg_husky_sim.linear_graph.report import text_report
+
+        numeric = compile_numeric(self.graph, self.outputs, chained=True)
+        known = all(name in self.values for name in numeric.parameters)
+        return text_report(
+            self.name, equations(self.graph, by_element=not by_parameter),
+            self._symbolic(by_parameter), None if by_parameter else self.graph,
+            (numeric, self.values) if known else None, self.note)
+
+    def latex(self, by_parameter: bool = False) -> str:
+        """
+        Return every step of the derivation as LaTeX (needs amsmath).
+
+        Parameters
+        ----------
+        by_parameter : bool
+            Write the parameters' expressions instead of the elements' names.
+        """
+        from lg_husky_sim.linear_graph.equations import equations
+        from lg_husky_sim.linear_graph.report import latex_report
+
+        return latex_report(self.name, equations(self.graph, by_element=not by_parameter),
+                            self._symbolic(by_parameter), self.note)
+
+    def draw(self, path: str | os.PathLike[str]) -> Path:
+        """
+        Draw the graph into a file.
+
+        Parameters
+        ----------
+        path : path-like
+            Ends in .svg, .png or .pdf.
+
+        Returns
+        -------
+        pathlib.Path
+        """
+        from lg_husky_sim.linear_graph.drawing import save_picture
+
+        save_picture(self.graph, Path(path), title=self.name)
+        return Path(path)
+
+    def export(self, path: str | os.PathLike[str], **values: float) -> Path:
+        """
+        Write A, B, C and D in numbers for other tools.
+
+        Parameters
+        ----------
+        path : path-like
+            .json, .mat, .npz, .h (C), .tex or .py (with python-control and scipy objects).
+        **values : float
+            Parameters by name, SI, in place of the graph's own.
+
+        Returns
+        -------
+        pathlib.Path
+
+        Raises
+        ------
+        SettingsError
+            If the ending is unknown, or the format cannot hold the model.
+        ParameterError
+            If a parameter has no number.
+        """
+        from lg_husky_sim.linear_graph.export import check_export, export
+
+        check_export(Path(path))
+        return export(self.numeric(**values), path, self.name, {**self.values, **values})
+
+    def to_control(self, **values: float) -> Any:
+        """Return the linear part in numbers as a python-control ``StateSpace``."""
+        from lg_husky_sim.linear_graph.export import to_control
+        return to_control(self.numeric(**values))
+
+    def to_scipy(self, **values: float) -> Any:
+        """Return the linear part in numbers as a ``scipy.signal.StateSpace``."""
+        from lg_husky_sim.linear_graph.export import to_scipy
+        return to_scipy(self.numeric(**values))
+
+    def _symbolic(self, by_parameter: bool) -> SymbolicStateSpace:
+        return derive(self.graph, self.outputs) if by_parameter else self.symbolic
+
+    def __repr__(self) -> str:
+        """Name the graph and its sizes."""
+        return f'<{type(self).__name__} {self.name}: {len(self.graph.branches)} branches>'
+
+    def _repr_latex_(self) -> str:
+        from lg_husky_sim.linear_graph.report import state_equation_latex
+
+        return f'${state_equation_latex(self.symbolic)}$'
+
+    def _repr_html_(self) -> str:
+        model = self.symbolic
+        variables = Table('', ('', 'names'), (
+            ('states x', ', '.join(model.states)), ('inputs u', ', '.join(model.inputs)),
+            ('outputs y', ', '.join(model.outputs))))
+        numbers = Table('', ('parameter', 'value [SI]'), tuple(self.values.items()))
+        return page_part(self.name, [self.note] * bool(self.note), [variables, numbers])
+
+
+def graph(source: str | os.PathLike[str] | LinearGraph, outputs: Sequence[str] = ()) -> Graph:
+    """
+    Read a linear graph of your own.
+
+    Parameters
+    ----------
+    source : path-like, str or LinearGraph
+        A netlist file, the text of one (with a line break in it), a graph made in Python; or
+        ``simplified`` or ``expanded``, the paper's two graphs of the Husky.
+    outputs : sequence of str
+        Variables to put out, such as ``'omega(J_1)'``; those of the netlist by default.
+
+    Returns
+    -------
+    Graph
+
+    Raises
+    ------
+    ModelFileError
+        If the file is no netlist.
+    GraphError
+        If the graph cannot be built.
+    """
+    if isinstance(source, str) and source in ('simplified', 'expanded'):
+        from lg_husky_sim.api.robots import paper_graph
+        return paper_graph(source, outputs)
+    if isinstance(source, LinearGraph):
+        return Graph('linear graph', source, {}, outputs)
+    if isinstance(source, str) and '\n' in source:
+        netlist = parse_netlist(source)
+    else:
+        netlist = read_netlist(Path(source))
+    return Graph(netlist.name, netlist.graph, netlist.values, outputs or netlist.outputs,
+                 netlist.about)

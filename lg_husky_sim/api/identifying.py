@@ -1,0 +1,170 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters from recordings: the fit as a value with tables, pictures and files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+import tempfile
+from typing import Any
+
+from lg_husky_sim import recording as rec
+from lg_husky_sim.api.progress import Shown, shown
+from lg_husky_sim.api.recordings import PathLike, read_all, Recordings, Topics
+from lg_husky_sim.api.robots import Husky
+from lg_husky_sim.api.tables import page_part, Table
+from lg_husky_sim.errors import FitError
+from lg_husky_sim.extras import require
+from lg_husky_sim.identification.estimate import estimate
+from lg_husky_sim.identification.options import with_effects
+from lg_husky_sim.identification.report import write_fit
+from lg_husky_sim.identification.result import FitResult, Method
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """
+    Parameters estimated from recordings. Made by :meth:`Husky.identify`.
+
+    Parameters
+    ----------
+    result : FitResult
+        Estimates, covariance, warnings and all that belongs to the fit.
+    segments : tuple of Segment
+        That were fitted.
+    before : Husky
+        The model as it was given.
+    """
+
+    result: FitResult
+    segments: tuple[rec.Segment, ...]
+    before: Husky
+
+    @property
+    def husky(self) -> Husky:
+        """The calibrated model."""
+        return Husky(self.result.model)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Estimates by name [SI]."""
+        return self.result.values
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search came to an end."""
+        return self.result.converged
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know before the estimates are used; parameters at their bounds among it."""
+        return self.result.warnings
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """What these data cannot determine, in sentences."""
+        return self.result.undetermined
+
+    def table(self) -> Table:
+        """Return the estimates with their 95 % intervals."""
+        return Table('', ('parameter', 'value', 'low', 'high', 'before', 'unit'), tuple(
+            (one.name, one.value, one.low, one.high, one.start, one.unit)
+            for one in self.result.estimates))
+
+    def channels(self) -> Table:
+        """Return the root mean square errors before and after, by channel."""
+        return Table('', ('channel', 'before', 'after', 'unit', 'samples'), tuple(
+            (one.name, one.before, one.after, one.unit, one.count)
+            for one in self.result.channels))
+
+    def to_pandas(self) -> Any:
+        """Return the estimates as a pandas DataFrame, index ``parameter``."""
+        return self.table().to_pandas().set_index('parameter')
+
+    def data(self) -> dict[str, Any]:
+        """Return the fit as plain data, schema ``lg_husky_sim/fit/1``."""
+        return self.result.data()
+
+    def plot(self, ax: Any = None) -> Any:
+        """
+        Draw the estimates' 95 % intervals, relative to the estimates.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current axes if not given.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        require('matplotlib', 'draw figures')
+        from lg_husky_sim.identification.pictures import draw_intervals
+        if ax is None:
+            from matplotlib import pyplot
+            ax = pyplot.gca()
+        draw_intervals(ax, self.result.estimates)
+        return ax
+
+    def save(self, path: PathLike) -> tuple[Path, ...]:
+        """
+        Write the model file and, beside it, the report as .txt, .json and .html.
+
+        Parameters
+        ----------
+        path : path-like
+            Ends in .yaml.
+
+        Returns
+        -------
+        tuple of pathlib.Path
+            Model, text, JSON, HTML.
+
+        Raises
+        ------
+        SettingsError
+            If the name cannot be used.
+        """
+        return write_fit(self.result, self.segments, self.before.model, Path(path))
+
+    def report(self, path: PathLike | None = None) -> Path:
+        """Write everything, into a temporary folder by default; return the page."""
+        place = path or Path(tempfile.mkdtemp(prefix='lg_husky_fit.')) / 'fit.yaml'
+        return self.save(place)[-1]
+
+    def __str__(self) -> str:
+        """Return the report as text."""
+        return str(self.result)
+
+    def _repr_html_(self) -> str:
+        state = 'converged' if self.converged else 'NOT CONVERGED'
+        return page_part(
+            f'Fit of {", ".join(self.result.recordings)}',
+            [f'{self.result.method.value}, {self.result.evaluations} simulations, {state}'],
+            [self.table(), self.channels()],
+            {'Warnings': self.warnings, 'What these data cannot determine': self.undetermined})
+
+
+def identify(husky: Husky, recordings: Recordings, free: Iterable[str] = (), *,
+             effects: Iterable[str] = (), method: str = 'least-squares',
+             nuisance: Iterable[str] = (), profiles: Iterable[str] = (), seed: int = 0,
+             starts: int = 6, jobs: int = 1, scheduler: str | None = None,
+             topics: Topics = None, progress: Shown = True) -> Fit:
+    """Estimate parameters; see :meth:`lg_husky_sim.Husky.identify`."""
+    methods = [one.value for one in Method]
+    if method not in methods:
+        raise FitError(f'method {method!r} is unknown; there are {", ".join(methods)}')
+    model = with_effects(husky.model, tuple(effects))
+    onset = model.structure.onset
+    with shown(progress, known=False) as report:
+        read, = rec.named_apart(rec.named_as_in(
+            read_all(recordings, topics=topics, progress=report),
+            () if onset is None else onset.recordings))
+        parts = tuple(part for one in read for part in rec.segments(one))
+        result = estimate(model, parts, method=Method(method), free=tuple(free),
+                          nuisance=tuple(nuisance), profiles=tuple(profiles), seed=seed,
+                          starts=starts, jobs=jobs, scheduler=scheduler, baseline=husky.model,
+                          progress=lambda word: report(f'fitting: {word}', None))
+    return Fit(result, parts, husky)

@@ -1,0 +1,60 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What can be chosen from: the catalogue of effects, the built-in manoeuvres."""
+
+from __future__ import annotations
+
+from lg_husky_sim.api.tables import Table
+from lg_husky_sim.husky.effects import catalogue
+from lg_husky_sim.manoeuvres import builtin_manoeuvres
+
+
+def list_effects(name: str | None = None) -> Table:
+    """
+    List the catalogue of effects, or the numbers of one.
+
+    Parameters
+    ----------
+    name : str, optional
+        Id of an effect.
+
+    Returns
+    -------
+    Table
+        With ``to_pandas()``; printed as text.
+
+    Raises
+    ------
+    ParameterError
+        If there is no effect of that id; a near one is suggested.
+    """
+    if name is None:
+        return Table('', ('effect', 'part', 'what it is', 'sides', 'forms'), tuple(
+            (kind.id, kind.subsystem.value, kind.title, _words(kind.sides), _words(kind.shapes))
+            for kind in catalogue().values()))
+    from lg_husky_sim.husky.effects import effect_kind
+    kind = effect_kind(name)
+    return Table(f'{kind.id}: {kind.title}',
+                 ('parameter', 'unit', 'typical', 'lower', 'upper', 'estimated', 'source'),
+                 tuple((p.name, p.unit, p.starts[0], p.lower, p.upper,
+                        'no' if p.fixed else 'yes', p.source) for p in kind.parameters))
+
+
+def _words(names: tuple[str, ...]) -> str:
+    return ', '.join(name for name in names if name not in ('', 'none'))
+
+
+def list_manoeuvres() -> Table:
+    """
+    List the built-in manoeuvres.
+
+    Returns
+    -------
+    Table
+        With ``to_pandas()``; printed as text.
+    """
+    return Table('', ('manoeuvre', 'length [s]', 'fastest [m/s]', 'fastest turn [rad/s]',
+                      'what it is'), tuple(
+        (one.name, round(one.duration, 1), max(abs(step.forward) for step in one.steps),
+         max(abs(step.yaw) for step in one.steps), one.about)
+        for one in builtin_manoeuvres().values()))

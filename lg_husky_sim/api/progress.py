@@ -1,0 +1,91 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Progress that shows itself: a bar in terminals and notebooks, one line a stage elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import sys
+import time
+from typing import Any, TypeAlias
+
+Report: TypeAlias = Callable[[str, float | None], None]
+"""Told what is being done, and which share of all is done (0 to 1; None where nobody knows)."""
+Shown: TypeAlias = bool | Report
+"""True: shown where someone watches; False: never; or a function that is told."""
+
+_BAR = '{desc:40.40} {percentage:3.0f} % |{bar}| {elapsed}'
+_COUNT = '{desc:40.40} {n_fmt} [{elapsed}]'
+
+
+def in_notebook() -> bool:
+    """Return whether this process is the kernel of a notebook."""
+    shell: Any = getattr(sys.modules.get('IPython'), 'get_ipython', lambda: None)()
+    return hasattr(shell, 'kernel')
+
+
+def watched() -> bool:
+    """Return whether someone sees a bar: in a notebook, or on a terminal."""
+    return in_notebook() or sys.stderr.isatty()
+
+
+@contextmanager
+def shown(progress: Shown, known: bool = True) -> Iterator[Report]:
+    """
+    Show how work goes on while the block runs.
+
+    Parameters
+    ----------
+    progress : bool or callable
+        See `Shown`.
+    known : bool
+        Whether shares are told; without them the steps are counted.
+
+    Yields
+    ------
+    callable
+        To be told the stage and the share.
+    """
+    if callable(progress):
+        yield progress
+        return
+    if not progress or not watched():
+        yield lambda stage, share: None
+        return
+    from tqdm.auto import tqdm
+    with tqdm(total=100 if known else None, leave=False, disable=False,
+              bar_format=None if in_notebook() else _BAR if known else _COUNT) as bar:
+        def report(stage: str, share: float | None) -> None:
+            bar.set_description(stage, refresh=False)
+            if share is not None:
+                bar.n = round(100.0 * share)
+            elif not known:
+                bar.update()
+            bar.refresh()
+        yield report
+
+
+class Lines:
+    """
+    One line a stage, for logs: what is being done, and after how long.
+
+    Parameters
+    ----------
+    write : callable
+        Takes a line.
+    """
+
+    def __init__(self, write: Callable[[str], object]) -> None:
+        """Start the clock."""
+        self._write = write
+        self._began = time.monotonic()
+        self._last = ''
+
+    def __call__(self, stage: str, share: float | None) -> None:
+        """Write a line if the stage is another one than before."""
+        if stage == self._last:
+            return
+        self._last = stage
+        part = '      ' if share is None else f'{share:5.0%} '
+        self._write(f'{time.monotonic() - self._began:7.1f} s {part} {stage}')

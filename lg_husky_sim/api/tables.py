@@ -1,0 +1,105 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of results: as text, as HTML for notebooks, and as DataFrames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+import math
+from typing import Any
+
+from lg_husky_sim.extras import require
+
+
+def cell(value: object) -> str:
+    """Return a value as it stands in a table; what is missing is a dash."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return '–'
+    if isinstance(value, float):
+        return f'{value:.4g}'
+    return str(value)
+
+
+def is_number(value: object) -> bool:
+    """Return whether a cell is set flush right."""
+    return value is None or (isinstance(value, (int, float)) and not isinstance(value, bool))
+
+
+@dataclass(frozen=True)
+class Table:
+    """
+    Rows under named columns.
+
+    Parameters
+    ----------
+    title : str
+    columns : tuple of str
+    rows : tuple of tuple
+        Texts and numbers; None where there is none.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[object, ...], ...]
+
+    def __str__(self) -> str:
+        """Return the table as text, columns aligned."""
+        cells = [self.columns, *(tuple(map(cell, row)) for row in self.rows)]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        right = [bool(self.rows) and all(is_number(row[k]) for row in self.rows)
+                 for k in range(len(self.columns))]
+        lines = ['  '.join(text.rjust(width) if flush else text.ljust(width)
+                           for text, width, flush in zip(row, widths, right, strict=True)
+                           ).rstrip() for row in cells]
+        return '\n'.join([self.title] * bool(self.title) + lines)
+
+    def html(self) -> str:
+        """Return the table as HTML; every text in it is escaped."""
+        head = ''.join(f'<th>{escape(name)}</th>' for name in self.columns)
+        body = ''.join('<tr>' + ''.join(
+            f'<td style="text-align:{"right" if is_number(value) else "left"}">'
+            f'{escape(cell(value))}</td>' for value in row) + '</tr>' for row in self.rows)
+        title = f'<caption>{escape(self.title)}</caption>' if self.title else ''
+        return (f'<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>')
+
+    def to_pandas(self) -> Any:
+        """Return the table as a pandas DataFrame."""
+        require('pandas', 'make a DataFrame')
+        import pandas as pd
+
+        return pd.DataFrame(list(self.rows), columns=list(self.columns))
+
+    def data(self) -> list[dict[str, object]]:
+        """Return the rows as plain data for JSON; what is no finite number is None."""
+        return [{name: finite(value) for name, value in zip(self.columns, row, strict=True)}
+                for row in self.rows]
+
+
+def finite(value: object) -> object:
+    """Return a value that JSON can hold."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def page_part(title: str, lines: Sequence[str], tables: Sequence[Table],
+              points: Mapping[str, Sequence[str]] | None = None) -> str:
+    """
+    Return a result as HTML for a notebook; every text in it is escaped.
+
+    Parameters
+    ----------
+    title : str
+    lines : sequence of str
+        Paragraphs.
+    tables : sequence of Table
+    points : mapping of str to sequence of str, optional
+        Lists by their heading; empty ones are left out.
+    """
+    parts = [f'<h4>{escape(title)}</h4>', *(f'<p>{escape(line)}</p>' for line in lines),
+             *(table.html() for table in tables if table.rows)]
+    for heading, items in (points or {}).items():
+        if items:
+            parts.append(f'<p><b>{escape(heading)}</b></p><ul>' + ''.join(
+                f'<li>{escape(item)}</li>' for item in items) + '</ul>')
+    return '<div class="lg-husky">' + ''.join(parts) + '</div>'

@@ -1,0 +1,243 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A state-space model for other tools: JSON, MATLAB, NumPy, C, LaTeX, Python, control, scipy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+import json
+import os
+from pathlib import Path
+import re
+import tempfile
+from typing import Any
+
+from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.extras import require
+from lg_husky_sim.linear_graph.state_space import FloatArray, MATRICES, StateSpace
+
+SCHEMA = 'lg_husky_sim/state_space/1'
+_NAMES = ('states', 'inputs', 'outputs', 'efforts', 'arguments')
+
+
+def used_matrices(space: StateSpace) -> dict[str, FloatArray]:
+    """Return A, B, C, D, and of the others those that are not zero."""
+    found: dict[str, FloatArray] = {}
+    for name in MATRICES:
+        matrix: FloatArray = getattr(space, name)
+        if name in 'ABCD' or (matrix.size and matrix.any()):
+            found[name] = matrix
+    return found
+
+
+def linear(space: StateSpace) -> StateSpace:
+    """
+    Return a model that A, B, C and D hold whole, but for laws that are not linear.
+
+    Raises
+    ------
+    SettingsError
+        If the outputs hang on the rate of change of an input: such a model is not proper.
+    """
+    proper = space.standard_form()
+    if proper.F.any():
+        raise SettingsError(
+            'outputs hang on the rate of change of an input (matrix F is not zero); only .json, '
+            '.mat and .npz can hold such a model')
+    return proper
+
+
+def to_control(space: StateSpace) -> Any:
+    """
+    Return the linear part as a python-control ``StateSpace``, with its names.
+
+    Raises
+    ------
+    MissingExtraError
+        If python-control is not installed.
+    SettingsError
+        If the model is not proper.
+    """
+    require('control', 'make a python-control system')
+    import control
+
+    own = linear(space)
+    return control.ss(own.A, own.B, own.C, own.D, states=list(own.states),
+                      inputs=list(own.inputs), outputs=list(own.outputs))
+
+
+def to_scipy(space: StateSpace) -> Any:
+    """
+    Return the linear part as a ``scipy.signal.StateSpace``.
+
+    Raises
+    ------
+    SettingsError
+        If the model is not proper.
+    """
+    from scipy.signal import StateSpace as Linear
+
+    own = linear(space)
+    return Linear(own.A, own.B, own.C, own.D)
+
+
+def export(space: StateSpace, path: str | os.PathLike[str], name: str = 'model',
+           parameters: Mapping[str, float] | None = None) -> Path:
+    """
+    Write a state-space model; the file's ending chooses the format.
+
+    Parameters
+    ----------
+    space : StateSpace
+    path : path-like
+        .json, .mat (MATLAB 5), .npz (NumPy), .h (C), .tex (LaTeX, amsmath) or .py (a module that
+        makes python-control and scipy objects). Replaced if it is there.
+    name : str
+        Title.
+    parameters : mapping of str to float, optional
+        Numbers that went in [SI], for the record.
+
+    Returns
+    -------
+    pathlib.Path
+
+    Raises
+    ------
+    SettingsError
+        If the ending is unknown, or the format cannot hold the model.
+    """
+    place = Path(path)
+    check_export(place)
+    content = _WRITERS[place.suffix](space, name, dict(parameters or {}))
+    place.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix='.lg_husky.', dir=place.parent) as scratch:
+        draft = Path(scratch) / place.name
+        draft.write_bytes(content)
+        os.replace(draft, place)
+    return place
+
+
+def check_export(path: Path) -> None:
+    """
+    Check that a model can be exported to a file of this name.
+
+    Raises
+    ------
+    SettingsError
+        If the ending is unknown, or a folder is there.
+    """
+    if path.suffix not in _WRITERS:
+        raise SettingsError(f'cannot export to {path}: the ending must be one of '
+                            f'{", ".join(_WRITERS)}')
+    if path.is_dir():
+        raise SettingsError(f'cannot export to {path}: a folder is there')
+
+
+def _as_json(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+    data = {'schema': SCHEMA, 'name': name,
+            'equations': 'dx/dt = A x + B u + E du/dt + G f(z), z = H x + K u + N f(z), '
+                         'y = C x + D u + F du/dt + L_c f(z)',
+            **{key: list(getattr(space, key)) for key in _NAMES},
+            **{key: matrix.tolist() for key, matrix in used_matrices(space).items()},
+            'parameters': dict(parameters)}
+    return (json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + '\n').encode()
+
+
+def _as_mat(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+    from io import BytesIO
+
+    import numpy as np
+    from scipy.io import savemat
+
+    stream = BytesIO()
+    cells = {key: np.array(list(getattr(space, key)), dtype=object) for key in _NAMES
+             if getattr(space, key)}
+    savemat(stream, {**used_matrices(space), **cells, 'name': name,
+                     'parameters': dict(parameters) or np.zeros((0, 0))},
+            long_field_names=True)
+    return stream.getvalue()
+
+
+def _as_npz(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+    from io import BytesIO
+
+    import numpy as np
+
+    stream = BytesIO()
+    texts = {key: np.array(getattr(space, key), dtype=np.str_) for key in _NAMES}
+    arrays: dict[str, Any] = {
+        **used_matrices(space), **texts, 'name': np.array(name),
+        'parameter_names': np.array(list(parameters), dtype=np.str_),
+        'parameter_values': np.array(list(parameters.values()), dtype=np.float64)}
+    np.savez(stream, **arrays)
+    return stream.getvalue()
+
+
+def _as_c(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+    own = linear(space)
+    lines = [f'/* {_comment(name)}: dx/dt = A x + B u, y = C x + D u; SI units.',
+             *(f' *   {letter}: {", ".join(names)}' for letter, names in
+               (('x', own.states), ('u', own.inputs), ('y', own.outputs))),
+             *([f' * Laws that are not linear are left out: {", ".join(own.efforts)}']
+               if own.efforts else []), ' */',
+             '#ifndef LG_HUSKY_MODEL_H', '#define LG_HUSKY_MODEL_H', '']
+    lines += [f'#define LG_HUSKY_{word} {len(names)}' for word, names in
+              (('STATES', own.states), ('INPUTS', own.inputs), ('OUTPUTS', own.outputs))]
+    for key in 'ABCD':
+        matrix = getattr(own, key)
+        rows = ',\n'.join('    {' + ', '.join(repr(float(v)) for v in row) + '}'
+                          for row in matrix)
+        lines += ['', f'static const double lg_husky_{key}[{matrix.shape[0]}]'
+                      f'[{matrix.shape[1]}] = {{', rows, '};']
+    return '\n'.join([*lines, '', '#endif', '']).encode()
+
+
+def _as_latex(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+    own = linear(space)
+    left_out = [f'% Laws that are not linear are left out: {", ".join(own.efforts)}'
+                ] if own.efforts else []
+    lines = [f'% {_comment(name)}; needs amsmath',
+             *(f'% {letter}: {", ".join(names)}' for letter, names in
+               (('x', own.states), ('u', own.inputs), ('y', own.outputs))), *left_out]
+    for key in 'ABCD':
+        rows = ' \\\\\n'.join(' & '.join(repr(float(v)) for v in row)
+                              for row in getattr(own, key))
+        lines += [rf'\[ {key} = \begin{{bmatrix}}', rows, r'\end{bmatrix} \]']
+    return ('\n'.join(lines) + '\n').encode()
+
+
+def _as_python(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+    own = linear(space)
+    left_out = f'\n\nLaws that are not linear are left out: {", ".join(own.efforts)}.' if (
+        own.efforts) else ''
+    matrices = '\n'.join(f'{key} = {getattr(own, key).tolist()!r}' for key in 'ABCD')
+    names = '\n'.join(f'{key} = {list(getattr(own, key))!r}' for key in _NAMES[:3])
+    return f'''"""
+{_comment(name)}: dx/dt = A x + B u, y = C x + D u; SI units.{left_out}
+"""
+
+{names}
+{matrices}
+
+
+def control_system():
+    """Return the model as a python-control StateSpace."""
+    import control
+    return control.ss(A, B, C, D, states=states, inputs=inputs, outputs=outputs)
+
+
+def scipy_system():
+    """Return the model as a scipy.signal.StateSpace."""
+    from scipy.signal import StateSpace
+    return StateSpace(A, B, C, D)
+'''.encode()
+
+
+def _comment(text: str) -> str:
+    # A title may come from a file: it must not end the comment or docstring that it stands in.
+    return re.sub(r'[\\"]|\*/', ' ', ' '.join(text.split()))
+
+
+_WRITERS: Mapping[str, Callable[[StateSpace, str, Mapping[str, float]], bytes]] = {
+    '.json': _as_json, '.mat': _as_mat, '.npz': _as_npz, '.h': _as_c, '.tex': _as_latex,
+    '.py': _as_python}

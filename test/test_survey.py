@@ -1,0 +1,133 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What `info` says of a recording before any fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import lg_husky_sim as lg
+from lg_husky_sim.api.surveys import hardly_driven, limits
+from lg_husky_sim.resources import config_path
+from lg_husky_sim.signals import TimeSeries
+import numpy as np
+import pytest
+import yaml
+
+
+@pytest.fixture(scope='module')
+def drive() -> lg.Recording:
+    return lg.Husky().simulate('obstacle')
+
+
+def with_streams(recording: lg.Recording, **streams: TimeSeries | None) -> lg.Recording:
+    """Return a recording with streams exchanged, or left out where they are None."""
+    merged = {**recording.streams, **streams}
+    return replace(recording, streams={k: v for k, v in merged.items() if v is not None})
+
+
+def scaled(series: TimeSeries, factor: float) -> TimeSeries:
+    return TimeSeries(series.times, series.values * factor, series.names)
+
+
+def test_a_whole_drive_is_enough_and_nothing_is_wrong(drive: lg.Recording) -> None:
+    survey = drive.info()
+    assert survey.enough
+    assert survey.warnings == ()
+    assert survey.verdict == 'Enough for diagnose.'
+    assert {row[0] for row in survey.streams.rows} >= {'command', 'wheels', 'imu', 'pose'}
+    assert str(survey).count('\n') > 10
+
+
+def test_wheels_off_the_ground_are_seen_at_once(drive: lg.Recording) -> None:
+    still = TimeSeries(drive.pose.times, np.zeros_like(drive.pose.values), drive.pose.names)
+    warnings = with_streams(drive, pose=still).info().warnings
+    assert len(warnings) == 1
+    assert warnings[0].startswith('wheels off the ground')
+
+
+def test_a_robot_with_other_wheels_is_no_husky(drive: lg.Recording) -> None:
+    slow = scaled(drive.wheels, 0.165 / 0.3)
+    warnings = with_streams(drive, wheels=slow).info().warnings
+    assert any('this is no Husky' in one for one in warnings)
+    assert not any('this is no Husky' in one for one in
+                   with_streams(drive, wheels=scaled(drive.wheels, 1.05)).info().warnings)
+
+
+def test_a_robot_of_its_own_dimensions_is_no_stranger_to_its_model(drive: lg.Recording) -> None:
+    slow = with_streams(drive, wheels=scaled(drive.wheels, 0.165 / 0.3))
+    assert not any('this is no Husky' in one
+                   for one in slow.info(lg.Husky(wheel_radius=0.3)).warnings)
+
+
+def test_without_commands_or_measurements_the_survey_says_what_is_missing(
+        drive: lg.Recording) -> None:
+    said = with_streams(drive, command=None).info()
+    assert not said.enough
+    assert said.missing[0].startswith('velocity commands')
+    only = replace(drive, streams={'command': drive.command}).info()
+    assert only.missing[0].startswith('a measurement')
+    assert only.verdict == 'Not enough for diagnose.'
+
+
+def test_a_drive_that_hardly_moves_is_not_enough() -> None:
+    times = np.arange(0.0, 6.0, 0.05)
+    short = lg.Husky().simulate((times, 0.4 + 0.0 * times, 0.0 * times)).info()
+    assert short.missing[0].startswith('motion: 6.0 s' if short.missing else 'none')
+
+
+def test_the_share_of_each_regime_adds_up_to_the_motion() -> None:
+    times = np.arange(0.0, 40.0, 0.05)
+    forward = np.where(times < 10, 0.5, np.where(times < 20, 0.0, np.where(times < 30, -0.4, 0.0)))
+    yaw = np.where((times >= 10) & (times < 20), 0.6, 0.0)
+    rows = {name: time for name, time, _ in lg.Husky().simulate(
+        (times, forward, yaw)).info().excitation.rows}
+    assert rows['straight ahead'] == pytest.approx(10.0, abs=0.1)
+    assert rows['turning on the spot'] == pytest.approx(10.0, abs=0.1)
+    assert rows['reversing'] == pytest.approx(10.0, abs=0.1)
+    assert rows['at rest'] == pytest.approx(10.0, abs=0.1)
+    assert rows['turning while driving'] == 0.0
+
+
+def test_regimes_that_were_hardly_driven_are_named(drive: lg.Recording) -> None:
+    assert 'reversing' in hardly_driven(drive.info().excitation)
+    assert 'turning while driving' not in hardly_driven(drive.info().excitation)
+
+
+def test_what_a_straight_drive_cannot_determine_is_said_before_any_fit() -> None:
+    times = np.arange(0.0, 30.0, 0.05)
+    straight = lg.Husky().simulate((times, 0.3 + 0.2 * np.sin(times), 0.0 * times)).info()
+    bend = lg.Husky().simulate((times, 0.3 + 0.2 * np.sin(times), 0.5 * np.sin(times))).info()
+
+    def verdict(survey: lg.Survey) -> str:
+        return next(str(row[4]) for row in survey.parameters.rows if row[0] == 'yaw_damping')
+    assert verdict(straight) == 'hardly determined'
+    assert verdict(bend) == 'determined'
+
+
+def test_a_sensor_that_falls_silent_before_the_commands_is_named(drive: lg.Recording) -> None:
+    part = with_streams(drive, wheels=drive.wheels.slice(0.0, 8.0))
+    assert any(one.startswith('wheels ends') for one in part.info().warnings)
+
+
+def test_a_drive_faster_than_any_husky_is_named() -> None:
+    times = np.arange(0.0, 15.0, 0.05)
+    fast = lg.Husky().simulate((times, 3.0 + 0.0 * times, 0.0 * times))
+    assert any('no Husky drives so fast' in one for one in fast.info().warnings)
+
+
+def test_each_limit_has_unit_meaning_and_source() -> None:
+    entries = yaml.safe_load(Path(config_path('survey.yaml')).read_text('utf-8'))['limits']
+    assert set(entries) == set(limits())
+    for entry in entries.values():
+        assert set(entry) == {'value', 'unit', 'meaning', 'source'}
+
+
+def test_the_survey_as_data_holds_what_the_text_says(drive: lg.Recording) -> None:
+    data = drive.info().data()
+    assert data['enough_for_diagnose'] is True
+    assert data['schema'] == 'lg_husky_sim/survey/1'
+    streams = data['streams']
+    assert isinstance(streams, list)
+    assert streams[0]['stream'] == 'command'
