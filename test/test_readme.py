@@ -13,6 +13,7 @@ from types import ModuleType
 
 import click
 from lg_husky_sim.cli.main import cli
+from lg_husky_sim.cli.ros_arguments import RosVerb, split_ros_args
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -76,6 +77,8 @@ def complaint(arguments: list[str]) -> str:
              for opt in (*parameter.opts, *parameter.secondary_opts)} | {'-h', '--help'}
     if isinstance(command, click.Group):
         return '' if not rest or rest[0] in command.commands else f'{rest[0]} is no {verb}'
+    if isinstance(command, RosVerb):
+        rest, _ = split_ros_args(rest)
     for word in rest:
         option = word.partition('=')[0]
         if re.match(r'--?[a-z]', option) and option not in known:

@@ -54,8 +54,8 @@ def command(out: Path, manoeuvre: str, model: str) -> None:
             except api.ExternalShutdownException:
                 # ROS 2 turns a signal into the end of the graph.
                 raise click.Abort from None
-        drive = read_drive(made / 'bag', settings.command_topic,
-                           f'/{settings.ground_truth_topic}', settings.odometry_topic)
+        drive = read_drive(made / 'bag', f'/{settings.command_topic}',
+                           f'/{settings.ground_truth_topic}', f'/{settings.odometry_topic}')
         save_picture(drive, made / 'picture.png',
                      f'Live node in a ROS 2 graph: {script.name} ({script.about})')
         lines = [

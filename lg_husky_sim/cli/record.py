@@ -7,28 +7,30 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, RosVerb, say
 
 
-@click.command(short_help="Record the robot's topics into a rosbag2.")
+@click.command(cls=RosVerb, short_help="Record the robot's topics into a rosbag2.",
+               epilog=ROS_HELP)
 @click.argument('bag', type=click.Path(path_type=Path))
-@click.option('--preset', default='paper', show_default=True,
-              help='Names and types of a robot: paper, husky_ros1 or clearpath_jazzy.')
+@robot_options
 @click.option('--storage', type=click.Choice(['mcap', 'sqlite3']), default='mcap',
               show_default=True, help='Storage of the rosbag2.')
 @click.option('--seconds', type=click.FloatRange(min=0.0, min_open=True), metavar='SECONDS',
               help='End by itself after so long; by default Ctrl-C ends it.')
-def command(bag: Path, preset: str, storage: str, seconds: float | None) -> None:
-    """Record command, odometry, joint states, IMU, battery and /tf into the folder BAG."""
-    from lg_husky_sim.ros import api
-    from lg_husky_sim.ros.recorder import record
-    from lg_husky_sim.ros.settings import make_settings
+@click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
+              type=click.FloatRange(min=0.0), help='How long to look for a Husky.')
+def command(bag: Path, preset: str | None, namespace: str | None, storage: str,
+            seconds: float | None, wait: float) -> None:
+    """
+    Record command, odometry, joint states, IMU, battery and transforms into the folder BAG.
 
-    settings = make_settings(preset=preset)
-    api.init(args=[])
-    try:
-        counts = record(bag, settings, storage=storage, seconds=seconds)
-    finally:
-        api.try_shutdown()
+    The bag is on disk while it grows: a process that is killed loses at most its last second.
+    """
+    from lg_husky_sim.ros.recorder import NAME, record
+
+    with ros_tool(NAME, preset, namespace, wait=wait) as (tool, settings):
+        counts = record(tool, bag, settings, storage=storage, seconds=seconds, say=say)
     for topic, count in counts.items():
         click.echo(f'{count:8d}  {topic}')
     click.echo(f'{bag} written')

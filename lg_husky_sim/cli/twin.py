@@ -11,24 +11,27 @@ import time
 from typing import TYPE_CHECKING
 
 import click
+from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, RosVerb
 
 if TYPE_CHECKING:
     from lg_husky_sim.ros.twin import Twin
 
 
-@click.command(short_help='Run models beside a live robot; show how far each is off.')
+@click.command(cls=RosVerb, epilog=ROS_HELP,
+               short_help='Run models beside a live robot; show how far each is off.')
 @click.option('--model', required=True, type=click.Path(path_type=Path), metavar='FILE.yaml',
               help='Model file, such as the model.yaml of a diagnosis.')
 @click.option('--plain', type=click.Path(path_type=Path), metavar='FILE.yaml',
               help="Model to compare with; the Husky with the paper's parameters by default.")
-@click.option('--preset', default='paper', show_default=True,
-              help='Names and types of a robot: paper, husky_ros1 or clearpath_jazzy.')
+@robot_options
 @click.option('--seconds', type=click.FloatRange(min=0.0, min_open=True), metavar='SECONDS',
               help='End by itself after so long; by default Ctrl-C ends it.')
 @click.option('--every', default=1.0, show_default=True, metavar='SECONDS',
               type=click.FloatRange(min=0.05), help='Time between two lines and publications.')
-def command(model: Path, plain: Path | None, preset: str, seconds: float | None, every: float
-            ) -> None:
+@click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
+              type=click.FloatRange(min=0.0), help='How long to look for a Husky.')
+def command(model: Path, plain: Path | None, preset: str | None, namespace: str | None,
+            seconds: float | None, every: float, wait: float) -> None:
     """
     Listen to a robot's commands, joint states and IMU, and run two models beside it.
 
@@ -38,27 +41,23 @@ def command(model: Path, plain: Path | None, preset: str, seconds: float | None,
     """
     from lg_husky_sim.husky.model import compile_model
     from lg_husky_sim.husky.model_file import load_model
-    from lg_husky_sim.ros import api
-    from lg_husky_sim.ros.settings import make_settings
-    from lg_husky_sim.ros.twin import Twin
+    from lg_husky_sim.ros.tool import Ended
+    from lg_husky_sim.ros.twin import NAME, Twin
 
     files = {'plain': load_model(plain), 'model': load_model(model)}
     plants = {name: compile_model(one.structure).at(one.parameters)
               for name, one in files.items()}
-    settings = make_settings(preset=preset)
-    api.init(args=[])
-    twin = Twin(plants, settings, _sides)
-    begun = time.monotonic()
-    try:
-        while seconds is None or time.monotonic() - begun < seconds:
-            twin.spin(every)
-            click.echo(f'{time.monotonic() - begun:7.1f} s  {_errors(twin, "now")}')
-    except (KeyboardInterrupt, api.ExternalShutdownException):
-        click.echo('')
-    finally:
-        click.echo(f'  overall  {_errors(twin, "overall")}')
-        twin.close()
-        api.try_shutdown()
+    with ros_tool(NAME, preset, namespace, wait=wait) as (tool, settings):
+        twin = Twin(tool, plants, settings, _sides)
+        begun = time.monotonic()
+        try:
+            while seconds is None or time.monotonic() - begun < seconds:
+                twin.spin(every)
+                click.echo(f'{time.monotonic() - begun:7.1f} s  {_errors(twin, "now")}')
+        except Ended:
+            click.echo('')
+        finally:
+            click.echo(f'  overall  {_errors(twin, "overall")}')
 
 
 def _sides(names: Sequence[str], rates: Sequence[float]) -> tuple[float, float]:

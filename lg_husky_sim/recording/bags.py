@@ -7,10 +7,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+import tempfile
 from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.errors import LgHuskyError, RecordingError
 from lg_husky_sim.extras import require
+from lg_husky_sim.recording.salvage import is_cut_off, salvage
 from lg_husky_sim.recording.topics import Topic
 
 if TYPE_CHECKING:
@@ -23,8 +25,10 @@ LONGEST_REASON = 200
 class Bag:
     """An open bag."""
 
-    def __init__(self, reader: AnyReader) -> None:
+    def __init__(self, reader: AnyReader, notes: Sequence[str] = ()) -> None:
         self._reader = reader
+        #: What had to be repaired to read it.
+        self.notes = tuple(notes)
 
     def topics(self) -> tuple[Topic, ...]:
         """Return the topics of the bag; one of several types is there once for each."""
@@ -85,9 +89,11 @@ def open_bag(path: Path) -> Iterator[Bag]:
 
     files = _files(path)
     try:
-        reader = AnyReader(files, default_typestore=get_typestore(Stores.ROS2_JAZZY))
-        with reader:
-            yield Bag(reader)
+        with tempfile.TemporaryDirectory(prefix='lg_husky_') as scratch:
+            whole, notes = _repaired(files, Path(scratch))
+            reader = AnyReader(whole, default_typestore=get_typestore(Stores.ROS2_JAZZY))
+            with reader:
+                yield Bag(reader, notes)
     except LgHuskyError:
         raise
     except Exception as error:  # damaged bytes raise anything in the decoders below
@@ -142,6 +148,16 @@ def _files(path: Path) -> list[Path]:
         raise RecordingError(
             f'{path} is no recording: a rosbag2 folder or a file {", ".join(SUFFIXES)} is')
     return [path]
+
+
+def _repaired(files: list[Path], scratch: Path) -> tuple[list[Path], list[str]]:
+    """Return what to open, with copies in place of .mcap files that were cut off."""
+    parts = sorted(files[0].glob('*.mcap')) if files[0].is_dir() else files
+    cut = [part for part in parts if part.suffix == '.mcap' and is_cut_off(part)]
+    if not cut:
+        return files, []
+    whole = [salvage(part, scratch) if part in cut else part for part in parts]
+    return whole, [f'{part.name} was cut off: read up to its last whole chunk' for part in cut]
 
 
 def _reason(error: Exception) -> str:

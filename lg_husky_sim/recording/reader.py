@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -82,8 +82,10 @@ def read_recording(path: str | PathLike[str], topics: TopicMap | None = None) ->
         present = bag.topics()
         whose = robots(present, chosen)
         found = _collect(bag, present, chosen, whose)
+        repaired = bag.notes
     try:
-        return _recording(place, present, found, chosen, whose)
+        read = _recording(place, present, found, chosen, whose)
+        return replace(read, notes=(*repaired, *read.notes))
     except RecordingError as error:
         raise RecordingError(f'cannot use {place}: {error}') from error
 

@@ -9,7 +9,7 @@ ROS installation must show its error and not be hidden by a fallback.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 import importlib
 from importlib.util import find_spec
 import os
@@ -49,8 +49,8 @@ if TYPE_CHECKING or not HAVE_RCLPY:
     )
     from lg_husky_sim.ros.embedded.spin import SingleThreadedExecutor, spin, spin_once
 
-    #: What a user's mistake raises; its message is one line.
-    USER_ERRORS: tuple[type[Exception], ...] = (LgHuskyError, ParameterException)
+    #: What ROS itself raises at a user's mistake.
+    ROS_ERRORS: tuple[type[Exception], ...] = (ParameterException,)
 else:
     from rclpy import init, ok, shutdown, spin, spin_once, try_shutdown
     from rclpy.duration import Duration
@@ -69,13 +69,16 @@ else:
     from rclpy.time import Time
     ParameterType = Parameter.Type
     _errors = rclpy_implementation
-    USER_ERRORS = (
-        LgHuskyError, NameValidationException, ParameterException, _errors.RCLError,
+    ROS_ERRORS = (
+        NameValidationException, ParameterException, _errors.RCLError,
         _errors.UnknownROSArgsError)
 
     def services_work() -> bool:
         """Return True: with rclpy every middleware carries services."""
         return True
+
+#: What a user's mistake raises; its message is one line.
+USER_ERRORS: tuple[type[Exception], ...] = (LgHuskyError, *ROS_ERRORS)
 
 
 def message_type(name: str) -> Any:
@@ -132,6 +135,38 @@ def parameter_overrides(node: Node) -> dict[str, Parameter]:
     return overrides
 
 
+def join(arguments: Sequence[str]) -> None:
+    """Join the graph as :func:`init` does, and leave the process's signals alone."""
+    if HAVE_RCLPY:
+        from rclpy.signals import SignalHandlerOptions
+        init(args=[*arguments],
+             signal_handler_options=SignalHandlerOptions.NO)  # type: ignore[call-arg]
+    else:
+        init(args=[*arguments], signals=False)
+
+
+def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Any:
+    """
+    Return a timer on the steady clock, whatever time the node goes by.
+
+    rclpy's timers go by the node's clock: they stand while /clock does, and for as long as the
+    system's clock was set back.
+
+    Parameters
+    ----------
+    node : Node
+    period : float
+        [s]
+    callback : callable
+
+    """
+    if not HAVE_RCLPY:
+        return node.create_timer(period, callback)
+    from rclpy.clock import Clock, ClockType
+    return node.create_timer(  # type: ignore[call-arg]
+        period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+
 def leave(node: Node) -> None:
     """End spinning from inside a callback, as a signal does."""
     if HAVE_RCLPY:
@@ -156,6 +191,7 @@ def describe_backend(environment: Mapping[str, str] = os.environ) -> str:
 
 __all__ = [
     'HAVE_RCLPY',
+    'ROS_ERRORS',
     'USER_ERRORS',
     'DurabilityPolicy',
     'Duration',
@@ -170,6 +206,7 @@ __all__ = [
     'Time',
     'describe_backend',
     'init',
+    'join',
     'leave',
     'message_type',
     'ok',
@@ -181,5 +218,6 @@ __all__ = [
     'shutdown',
     'spin',
     'spin_once',
+    'steady_timer',
     'try_shutdown',
 ]

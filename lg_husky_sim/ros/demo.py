@@ -104,7 +104,8 @@ def run_demo(manoeuvre: Manoeuvre, bag: Path, settings: Settings, model: str = '
         first = time.monotonic() - start
         children.append(subprocess.Popen(  # noqa: S603
             [sys.executable, '-m', 'lg_husky_sim.cli.main', 'drive', manoeuvre.name, '--preset',
-             settings.preset], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE))
+             settings.preset, '--namespace', '/'],
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE))
         begun, ended = time.monotonic(), 0.0
         while not ended or time.monotonic() < ended + _AFTER:
             executor.spin_once(timeout_sec=0.05)

@@ -5,73 +5,60 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import time
 
-from lg_husky_sim.errors import CommandError
 from lg_husky_sim.manoeuvres import Manoeuvre
-from lg_husky_sim.ros import api
-from lg_husky_sim.ros.conversions import set_stamp
+from lg_husky_sim.ros.commands import Commands, Say
 from lg_husky_sim.ros.settings import Settings
+from lg_husky_sim.ros.tool import Tool
 
 NAME = 'lg_husky_driver'
 
 
-def drive(manoeuvre: Manoeuvre, settings: Settings, *, wait: float = 10.0,
-          progress: Callable[[float], object] | None = None) -> int:
+def drive(tool: Tool, manoeuvre: Manoeuvre, settings: Settings, *, wait: float = 10.0,
+          say: Say = print, progress: Callable[[float], object] | None = None) -> int:
     """
-    Send the commands of a manoeuvre to whoever listens; needs :func:`api.init` before.
+    Send the commands of a manoeuvre to whoever listens, then zero, whatever happens.
 
     Parameters
     ----------
+    tool : Tool
+        Joins the graph; its clock paces the commands.
     manoeuvre : Manoeuvre
         What to drive.
     settings : Settings
-        Topic and type of the command.
+        Topic, type and limits of the command.
     wait : float
         How long to wait for a listener [s].
+    say : callable
+        Is told what listens, before anything moves, and what was limited.
     progress : callable, optional
         Receives the time within the manoeuvre [s] at each command.
 
     Returns
     -------
     int
-        Number of commands sent.
+        Number of commands sent, without the zeros at the end.
 
     Raises
     ------
     CommandError
         If nobody listens.
+    Ended
+        If the tool was asked to end; the robot is stopped then.
 
     """
-    node = api.Node(NAME)
-    executor = api.SingleThreadedExecutor()
-    executor.add_node(node)
-    stamped = settings.command_type == 'TwistStamped'
-    kind = api.message_type(f'geometry_msgs/msg/{settings.command_type}')
-    try:
-        publisher = node.create_publisher(kind, settings.command_topic, 10)
-        end = time.monotonic() + wait
-        while publisher.get_subscription_count() == 0:
-            executor.spin_once(timeout_sec=0.05)
-            if time.monotonic() > end:
-                raise CommandError(
-                    f'nobody listens to {settings.command_topic} ({settings.command_type}) '
-                    f'after {wait:g} s; is sim_node running in this domain?')
-        commands = manoeuvre.commands()
-        start = time.monotonic()
-        message = kind()
-        twist = message.twist if stamped else message
-        for moment, (forward, yaw) in zip(commands.times.tolist(), commands.values.tolist(),
+    with Commands(tool, settings) as commands:
+        commands.wait(wait, say)
+        script = manoeuvre.commands()
+        start = tool.now()
+        for moment, (forward, yaw) in zip(script.times.tolist(), script.values.tolist(),
                                           strict=True):
-            while (left := start + moment - time.monotonic()) > 0.0:
-                executor.spin_once(timeout_sec=left)
-            twist.linear.x, twist.angular.z = forward, yaw
-            if stamped:
-                set_stamp(message.header.stamp, node.get_clock().now().nanoseconds)
-            publisher.publish(message)
+            tool.serve_until(start + moment)
+            tool.orderly.check()
+            commands.send(forward, yaw)
             if progress is not None:
                 progress(moment)
-        return len(commands)
-    finally:
-        executor.shutdown()
-        node.destroy_node()
+    if commands.limited:
+        say(f'{commands.limited} of {commands.sent} commands were beyond the limits of preset '
+            f'{settings.preset}')
+    return commands.sent

@@ -1,26 +1,30 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Record the robot's topics into a rosbag2, which appears whole or not at all."""
+"""Record the robot's topics into a rosbag2 that is readable whenever it ends."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from os import replace
 from pathlib import Path
 import shutil
-import tempfile
 import time
 from typing import Any
 
 from lg_husky_sim.errors import RecordingError
-from lg_husky_sim.extras import require
 from lg_husky_sim.ros import api
+from lg_husky_sim.ros.bag_writer import bag_writer
+from lg_husky_sim.ros.commands import Say
+from lg_husky_sim.ros.graph import publishers
 from lg_husky_sim.ros.settings import Settings
+from lg_husky_sim.ros.tool import Ended, LOOK, Tool
 
 NAME = 'lg_husky_recorder'
-STORAGES = ('mcap', 'sqlite3')
 #: Samples kept while the disk is busy.
 _DEPTH = 1000
+#: Most that a killed process loses [s]; half of it passes between two flushes.
+LOSES = 1.0
+#: Time between two lines of running counts [s].
+EVERY = 5.0
 
 
 def recorded_topics(settings: Settings) -> dict[str, str]:
@@ -32,14 +36,32 @@ def recorded_topics(settings: Settings) -> dict[str, str]:
         settings.joint_states_topic: 'sensor_msgs/msg/JointState',
         settings.imu_topic: 'sensor_msgs/msg/Imu',
         settings.battery_topic: 'sensor_msgs/msg/BatteryState',
+        # Those of the robot's own, as Clearpath has them, and those of the whole graph.
+        'tf': 'tf2_msgs/msg/TFMessage',
+        'tf_static': 'tf2_msgs/msg/TFMessage',
         '/tf': 'tf2_msgs/msg/TFMessage',
+        '/tf_static': 'tf2_msgs/msg/TFMessage',
     }
     return {topic: kind for topic, kind in topics.items() if api.message_type(kind) is not None}
 
 
+def adapted(node: api.Node, topic: str, kind: str) -> tuple[bool, bool]:
+    """
+    Return the quality of service that gets the most from all who publish a type on a topic.
+
+    Returns
+    -------
+    reliable, latched : bool
+        Reliable unless somebody is not; what was said before if everybody keeps it.
+
+    """
+    ends = [end for end in publishers(node, topic) if end.kind == kind]
+    return all(end.reliable for end in ends), bool(ends) and all(end.latched for end in ends)
+
+
 class Recorder:
     """
-    Subscribes to topics and writes what comes into a bag.
+    Subscribes to topics as their publishers offer them and writes what comes into a bag.
 
     Parameters
     ----------
@@ -61,35 +83,44 @@ class Recorder:
 
     def __init__(self, node: api.Node, path: Path, topics: Mapping[str, str],
                  storage: str = 'mcap') -> None:
-        """Open the bag and subscribe."""
-        require('rosbags', 'write recordings')
-        from rosbags.rosbag2 import StoragePlugin, Writer
-        from rosbags.typesys import get_typestore, Stores
-        if storage not in STORAGES:
-            raise RecordingError(
-                f'storage {storage!r} is unknown; there are {", ".join(STORAGES)}')
-        if path.exists() or path.is_symlink():
-            raise RecordingError(f'{path} exists already; choose another name or remove it')
+        """Open the bag and begin to look for publishers."""
         self.path = path
         self.counts: dict[str, int] = {}
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._scratch = tempfile.mkdtemp(prefix=f'.{path.name}.', dir=path.parent)
-        self._made = Path(self._scratch) / path.name
-        store = get_typestore(Stores.ROS2_JAZZY)
-        plugin = StoragePlugin.MCAP if storage == 'mcap' else StoragePlugin.SQLITE3
-        self._writer: Any = Writer(self._made, version=9, storage_plugin=plugin)
-        self._writer.open()
-        for topic, kind in topics.items():
-            name = node.resolve_topic_name(topic)
-            connection = self._writer.add_connection(name, kind, typestore=store)
+        self._node = node
+        self._writer: Any = bag_writer(path, storage)
+        self._kinds = {node.resolve_topic_name(topic): kind for topic, kind in topics.items()}
+        self._heard: dict[str, tuple[tuple[bool, bool], Any]] = {}
+        for name, kind in self._kinds.items():
+            self._writer.add(name, kind)
             self.counts[name] = 0
-            node.create_subscription(
-                api.message_type(kind), topic, self._writing(name, connection), _DEPTH)
+            # So the first command of a driver that appears later is not missed.
+            self._subscribe(name, (True, False))
+        self._timers = [api.steady_timer(node, LOOK, self._look),
+                        api.steady_timer(node, 0.5 * LOSES, self._writer.flush)]
 
-    def _writing(self, topic: str, connection: Any) -> Callable[[Any], None]:
+    def _subscribe(self, topic: str, quality: tuple[bool, bool]) -> None:
+        reliable, latched = quality
+        profile = api.QoSProfile(
+            depth=_DEPTH,
+            reliability=api.ReliabilityPolicy.RELIABLE if reliable
+            else api.ReliabilityPolicy.BEST_EFFORT,
+            durability=api.DurabilityPolicy.TRANSIENT_LOCAL if latched
+            else api.DurabilityPolicy.VOLATILE)
+        self._heard[topic] = (quality, self._node.create_subscription(
+            api.message_type(self._kinds[topic]), topic, self._writing(topic), profile))
+
+    def _look(self) -> None:
+        for topic, kind in self._kinds.items():
+            quality, subscription = self._heard[topic]
+            wanted = adapted(self._node, topic, kind)
+            if wanted != quality and publishers(self._node, topic):
+                self._node.destroy_subscription(subscription)
+                self._subscribe(topic, wanted)
+
+    def _writing(self, topic: str) -> Callable[[Any], None]:
         def write(message: Any) -> None:
             if self._writer is not None:
-                self._writer.write(connection, time.time_ns(), api.serialised(message))
+                self._writer.write(topic, time.time_ns(), api.serialised(message))
                 self.counts[topic] += 1
         return write
 
@@ -100,25 +131,36 @@ class Recorder:
         Parameters
         ----------
         keep : bool
-            Whether the bag shall appear at its path, or be thrown away.
+            Whether the bag shall stay, or be thrown away.
 
         """
         if self._writer is None:
             return
         writer, self._writer = self._writer, None
+        for timer in self._timers:
+            self._node.destroy_timer(timer)
+        for _, subscription in self._heard.values():
+            self._node.destroy_subscription(subscription)
         writer.close()
-        if keep:
-            replace(self._made, self.path)
-        shutil.rmtree(self._scratch)
+        if not keep:
+            shutil.rmtree(self.path)
 
 
-def record(path: Path, settings: Settings, *, storage: str = 'mcap',
-           seconds: float | None = None) -> dict[str, int]:
+def running(counts: Mapping[str, int], seconds: float) -> str:
+    """Return how much has come so far, in a line."""
+    heard = {topic: count for topic, count in counts.items() if count}
+    words = ', '.join(f'{topic} {count}' for topic, count in heard.items())
+    return f'{seconds:7.1f} s  {sum(counts.values())} messages' + (f': {words}' if words else '')
+
+
+def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
+           seconds: float | None = None, say: Say = print) -> dict[str, int]:
     """
-    Record until the time is over or Ctrl-C; needs :func:`api.init` before.
+    Record until the time is over or the tool is asked to end.
 
     Parameters
     ----------
+    tool : Tool
     path : Path
         Folder to make.
     settings : Settings
@@ -127,29 +169,40 @@ def record(path: Path, settings: Settings, *, storage: str = 'mcap',
         ``mcap`` or ``sqlite3``.
     seconds : float, optional
         How long [s].
+    say : callable
+        Is told every few seconds how much has come.
 
     Returns
     -------
     dict
         Messages of each topic.
 
+    Raises
+    ------
+    RecordingError
+        If nothing came; no bag is left then.
+
     """
-    node = api.Node(NAME)
-    executor = api.SingleThreadedExecutor()
-    executor.add_node(node)
-    recorder = None
+    recorder = Recorder(tool.node, path, recorded_topics(settings), storage)
+    begun = time.monotonic()
     try:
-        recorder = Recorder(node, path, recorded_topics(settings), storage)
-        end = None if seconds is None else time.monotonic() + seconds
+        due = begun + EVERY
         try:
-            while api.ok() and (end is None or time.monotonic() < end):
-                executor.spin_once(timeout_sec=0.1)
-        except (KeyboardInterrupt, api.ExternalShutdownException):
-            node.get_logger().info('stopped')
-        recorder.close()
+            while seconds is None or time.monotonic() < begun + seconds:
+                tool.serve()
+                if time.monotonic() >= due:
+                    due += EVERY
+                    say(running(recorder.counts, time.monotonic() - begun))
+        except Ended:
+            say('stopped')
+        empty = not any(recorder.counts.values())
+        recorder.close(keep=not empty)
+        if empty:
+            present = ', '.join(name for name, _ in tool.node.get_topic_names_and_types()
+                                if name not in recorder.counts)
+            raise RecordingError(
+                f'nothing came on {", ".join(recorder.counts)}; nothing is written. In the graph '
+                f'({api.describe_backend()}) there are: {present or "no topics"}')
         return recorder.counts
     finally:
-        if recorder is not None:
-            recorder.close(keep=False)
-        executor.shutdown()
-        node.destroy_node()
+        recorder.close(keep=any(recorder.counts.values()))

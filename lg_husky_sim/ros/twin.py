@@ -14,6 +14,7 @@ from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.ros import api
 from lg_husky_sim.ros.conversions import twist_from_msg
 from lg_husky_sim.ros.settings import Settings
+from lg_husky_sim.ros.tool import Tool
 from lg_husky_sim.signals import BodyTwist, TimeSeries
 from lg_husky_sim.simulation import Simulator, SimulatorState
 from lg_husky_sim.simulation.starting import commanded_until
@@ -154,6 +155,7 @@ class Twin:
 
     Parameters
     ----------
+    tool : Tool
     plants : mapping of str to Plant
         By the name under which their errors are published.
     settings : Settings
@@ -162,11 +164,11 @@ class Twin:
         See :data:`Sides`.
     """
 
-    def __init__(self, plants: Mapping[str, Plant], settings: Settings, sides: Sides) -> None:
-        """Join the graph."""
-        self.node = api.Node(NAME)
-        self._executor = api.SingleThreadedExecutor()
-        self._executor.add_node(self.node)
+    def __init__(self, tool: Tool, plants: Mapping[str, Plant], settings: Settings, sides: Sides
+                 ) -> None:
+        """Subscribe to the robot."""
+        self._tool = tool
+        self.node = tool.node
         self._sides = sides
         self._stamped = settings.command_type == 'TwistStamped'
         self.shadows = {name: Shadow(plant, settings.command_timeout)
@@ -205,16 +207,11 @@ class Twin:
     def spin(self, seconds: float) -> None:
         """Serve callbacks for some time [s], then publish the running errors."""
         end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0.0:
-            self._executor.spin_once(timeout_sec=left)
+        while time.monotonic() < end:
+            self._tool.serve()
         for (name, quantity), publisher in self._publishers.items():
             value = self.shadows[name].errors[quantity].now
             if math.isfinite(value):
                 message = self._float()
                 message.data = value
                 publisher.publish(message)
-
-    def close(self) -> None:
-        """Leave the graph."""
-        self._executor.shutdown()
-        self.node.destroy_node()

@@ -25,7 +25,8 @@ import pytest
 for needed in ('rosbags', 'cyclonedds'):
     pytest.importorskip(needed)
 
-from lg_husky_sim.ros.twin import RunningError, Shadow, Twin  # noqa: E402, I100
+from lg_husky_sim.ros.tool import Orderly, Tool  # noqa: E402, I100
+from lg_husky_sim.ros.twin import NAME, RunningError, Shadow, Twin  # noqa: E402
 from lg_husky_sim.testing.live import probed_domain  # noqa: E402
 
 
@@ -144,7 +145,8 @@ def test_live_error_drops_with_the_augmented_model(
     with probed_domain() as probe:
         heard: dict[str, list[Any]] = {name: probe.listen(
             'std_msgs/msg/Float64', f'twin/{name}/yaw_rate_error') for name in plants}
-        twin = Twin(plants, settings, _sides)
+        tool = Tool(NAME, Orderly())
+        twin = Twin(tool, plants, settings, _sides)
         try:
             player = subprocess.Popen(
                 [sys.executable, '-m', 'lg_husky_sim.cli.main', 'play', str(tmp_path / 'bag'),
@@ -163,7 +165,7 @@ def test_live_error_drops_with_the_augmented_model(
             assert errors['model'].overall < 0.7 * errors['plain'].overall
             assert heard['plain'][-1].data > heard['model'][-1].data > 0.0
         finally:
-            twin.close()
+            tool.close()
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
@@ -212,7 +214,7 @@ def test_a_signal_ends_the_twin_with_its_errors(tmp_path: Path, number: signal.S
     with probed_domain():
         twin = subprocess.Popen(
             [sys.executable, '-u', '-m', 'lg_husky_sim.cli.main', 'twin', '--model',
-             str(tmp_path / 'model.yaml'), '--every', '0.2'],
+             str(tmp_path / 'model.yaml'), '--every', '0.2', '--preset', 'paper'],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         assert twin.stdout is not None
         try:

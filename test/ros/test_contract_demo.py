@@ -9,8 +9,10 @@ from pathlib import Path
 
 from lg_husky_sim.errors import CommandError, RecordingError
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
+from lg_husky_sim.ros.commands import ZEROS
 from lg_husky_sim.ros.driver import drive
 from lg_husky_sim.ros.settings import make_settings
+from lg_husky_sim.ros.tool import Orderly, Tool
 from lg_husky_sim.testing.live import LiveHusky, Probe
 import numpy as np
 import pytest
@@ -28,22 +30,23 @@ def test_a_driven_recording_can_be_read_and_summed_up(
     settings = make_settings()
     recorder = Recorder(probe.node, tmp_path / 'bag', recorded_topics(settings), storage)
     husky = start()
-    assert probe.until(lambda: recorder.counts[settings.odometry_topic] > 5)
+    assert probe.until(lambda: recorder.counts[f'/{settings.odometry_topic}'] > 5)
     seen: list[float] = []
-    assert drive(SHORT, settings, progress=seen.append) == len(SHORT.commands())
+    tool = Tool('lg_husky_driver', Orderly())
+    assert drive(tool, SHORT, settings, progress=seen.append) == len(SHORT.commands())
+    tool.close()
     probe.spin(0.5)
     assert husky.node.stop() == 0
-    assert not (tmp_path / 'bag').exists()
     recorder.close()
-    assert recorder.counts[settings.command_topic] == len(SHORT.commands())
+    assert recorder.counts[f'/{settings.command_topic}'] == len(SHORT.commands()) + ZEROS
     assert seen == sorted(seen)
     recording = read_recording(tmp_path / 'bag')
     command = recording.streams['command']
     assert np.max(command.column('forward')) == 0.5
     assert np.max(np.abs(recording.streams['imu'].column('yaw_rate'))) > 0.2
     assert set(recording.streams) >= {'command', 'wheels', 'imu', 'pose'}
-    told = read_drive(tmp_path / 'bag', settings.command_topic, '/ground_truth',
-                      settings.odometry_topic)
+    told = read_drive(tmp_path / 'bag', f'/{settings.command_topic}', '/ground_truth',
+                      f'/{settings.odometry_topic}')
     lines = summary_lines(told)
     assert any('steps, 50.0' in line for line in lines)
     assert told.truth[-1, 1] > 0.2
@@ -83,7 +86,7 @@ def test_a_driver_without_listener_says_so(probe: Probe) -> None:
     """Nobody listens: one line that names topic, type and what may be wrong."""
     settings = make_settings(command_topic='/nobody/cmd_vel')
     with pytest.raises(CommandError, match=r'nobody listens to /nobody/cmd_vel \(Twist\)'):
-        drive(SHORT, settings, wait=0.2)
+        drive(Tool('lg_husky_driver', Orderly()), SHORT, settings, wait=0.2)
 
 
 def test_a_failed_recording_leaves_nothing(probe: Probe, tmp_path: Path) -> None:

@@ -63,17 +63,17 @@ def test_the_urdf_has_the_models_measures_and_joint_names() -> None:
 def test_layouts_show_topics_that_exist() -> None:
     """The files for RViz and Foxglove parse, and name topics of the default preset."""
     settings = make_settings()
-    known = {settings.command_topic, settings.odometry_topic, '/ground_truth', 'ground_truth',
-             settings.imu_topic, settings.joint_states_topic, 'robot_description',
-             '/robot_description', settings.initial_pose_topic}
+    relative = {settings.command_topic, settings.odometry_topic, settings.ground_truth_topic,
+                settings.imu_topic, settings.joint_states_topic, 'robot_description',
+                settings.initial_pose_topic}
     rviz = yaml.safe_load((ROOT / 'config' / 'husky.rviz').read_text(encoding='utf-8'))
     displays = rviz['Visualization Manager']['Displays']
     assert rviz['Visualization Manager']['Global Options']['Fixed Frame'] == settings.odom_frame
     shown = {d['Topic']['Value'] for d in displays if 'Topic' in d}
     assert shown
-    assert shown <= known
+    assert shown <= relative
     text = (ROOT / 'config' / 'husky.foxglove.json').read_text(encoding='utf-8')
     panels = json.loads(text)['configById']
     paths = [path['value'] for panel in panels.values() for path in panel.get('paths', ())]
     assert len(paths) == 8
-    assert all(path.split('.')[0] in known for path in paths)
+    assert all(path.split('.')[0] in {f'/{topic}' for topic in relative} for path in paths)

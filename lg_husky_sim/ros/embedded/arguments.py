@@ -177,7 +177,8 @@ class NodeNames:
 
         """
         own = name
-        for rule in arguments.remaps:
+        # The first rule counts, as in rcl.
+        for rule in reversed(arguments.remaps):
             if rule.node in (None, own):
                 if rule.name in ('__node', '__name'):
                     name = str(rule.value)

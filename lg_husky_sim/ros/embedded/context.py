@@ -20,6 +20,7 @@ from cyclonedds.topic import Topic
 from lg_husky_sim.ros.embedded.arguments import Arguments, parse
 from lg_husky_sim.ros.embedded.definitions import type_hash
 from lg_husky_sim.ros.embedded.environment import Discovery, read_discovery
+from lg_husky_sim.ros.embedded.graph import Graph
 from lg_husky_sim.ros.embedded.idl import sample_type
 from lg_husky_sim.ros.embedded.messages import message_class, serialise
 from lg_husky_sim.ros.embedded.qos import dds_qos, DurabilityPolicy, QoSProfile
@@ -45,6 +46,7 @@ class Context:
         self.nodes: list[Node] = []
         self._topics: dict[tuple[str, str, bool], Topic[Any]] = {}
         self._lock = threading.Lock()
+        self._look: Graph | None = None
         xml = discovery.xml(os.environ.get('CYCLONEDDS_URI', ''))
         self._domain = Domain(discovery.domain, xml or None)
         self.participant = DomainParticipant(
@@ -62,6 +64,12 @@ class Context:
             self._topics[key] = Topic(
                 self.participant, name, cast('Any', sample_type(kind, header=header)))
         return self._topics[key]
+
+    def look(self) -> Graph:
+        """Return the view of the graph; the first call begins to look."""
+        if self._look is None:
+            self._look = Graph(self.participant)
+        return self._look
 
     def announce(self) -> None:
         """Tell the graph which node owns which endpoint, as rmw_dds_common does."""
@@ -88,6 +96,7 @@ class Context:
         for node in tuple(self.nodes):
             node.destroy_node()
         self._topics.clear()
+        self._look = None
         del self._graph, self.guard, self.participant, self._domain
         gc.collect()
 
@@ -101,7 +110,8 @@ def _on_signal(number: int, frame: FrameType | None) -> None:
         _default[0].running = False
 
 
-def init(*, args: Sequence[str] | None = None, domain_id: int | None = None) -> None:
+def init(*, args: Sequence[str] | None = None, domain_id: int | None = None,
+         signals: bool = True) -> None:
     """
     Join the ROS graph.
 
@@ -111,6 +121,8 @@ def init(*, args: Sequence[str] | None = None, domain_id: int | None = None) -> 
         Command line; ``sys.argv`` if not given.
     domain_id : int, optional
         Instead of ROS_DOMAIN_ID.
+    signals : bool
+        Whether SIGINT and SIGTERM shall end spinning.
 
     Raises
     ------
@@ -127,7 +139,7 @@ def init(*, args: Sequence[str] | None = None, domain_id: int | None = None) -> 
     if domain_id is not None:
         environment['ROS_DOMAIN_ID'] = str(domain_id)
     _default.append(Context(arguments, read_discovery(environment)))
-    if threading.current_thread() is threading.main_thread():
+    if signals and threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             _before[number] = signal.signal(number, _on_signal)
 

@@ -13,6 +13,7 @@ from lg_husky_sim.ros.embedded.arguments import NodeNames
 from lg_husky_sim.ros.embedded.clock import Clock, Time
 from lg_husky_sim.ros.embedded.context import default_context
 from lg_husky_sim.ros.embedded.endpoints import Publisher, Service, Subscription, Timer
+from lg_husky_sim.ros.embedded.graph import TopicEndpointInfo
 from lg_husky_sim.ros.embedded.logger import RcutilsLogger
 from lg_husky_sim.ros.embedded.messages import Message, message_class
 from lg_husky_sim.ros.embedded.parameter_services import offer_parameter_services
@@ -119,6 +120,18 @@ class Node:
     def resolve_topic_name(self, topic: str) -> str:
         """Return the full name of a topic after remapping."""
         return self._names.expand(topic)
+
+    def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
+        """Return what topics there are in the graph, and their types."""
+        return self.context.look().topics()
+
+    def get_publishers_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
+        """Return who publishes a topic."""
+        return self.context.look().endpoints('publisher', self._names.expand(topic_name))
+
+    def get_subscriptions_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
+        """Return who subscribes to a topic."""
+        return self.context.look().endpoints('subscription', self._names.expand(topic_name))
 
     def get_logger(self) -> RcutilsLogger:
         """Return the node's logger."""

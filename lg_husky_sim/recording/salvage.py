@@ -1,0 +1,69 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""An .mcap file that was cut off: its whole records, as a file that can be read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import shutil
+import struct
+from typing import BinaryIO
+
+#: First and last bytes of every MCAP file.
+MAGIC = b'\x89MCAP0\r\n'
+#: Records by their code (MCAP specification, "Records").
+_FOOTER, _DATA_END = 0x02, 0x0F
+_HEAD = struct.Struct('<BQ')
+#: What ends a file without an index: no checksum, no summary.
+_END = (_HEAD.pack(_DATA_END, 4) + b'\0' * 4 + _HEAD.pack(_FOOTER, 20) + b'\0' * 20 + MAGIC)
+
+
+def is_cut_off(path: Path) -> bool:
+    """Return whether a file begins as MCAP and does not end as such."""
+    with path.open('rb') as file:
+        begins = file.read(len(MAGIC)) == MAGIC
+        size = file.seek(0, 2)
+        file.seek(max(0, size - len(MAGIC)))
+        return begins and (size < 2 * len(MAGIC) or file.read() != MAGIC)
+
+
+def _whole(file: BinaryIO, size: int) -> int:
+    # Where the last whole record of the data ends.
+    place = len(MAGIC)
+    while place + _HEAD.size <= size:
+        file.seek(place)
+        code, length = _HEAD.unpack(file.read(_HEAD.size))
+        if code in (_DATA_END, _FOOTER) or place + _HEAD.size + length > size:
+            break
+        place += _HEAD.size + length
+    return place
+
+
+def salvage(path: Path, folder: Path) -> Path:
+    """
+    Copy the whole records of a file that was cut off, and end the copy properly.
+
+    Chunks are records: the copy holds everything up to the last whole chunk.
+
+    Parameters
+    ----------
+    path : Path
+        Not changed.
+    folder : Path
+        Where the copy goes, under the same name.
+
+    Returns
+    -------
+    Path
+        Of the copy.
+
+    """
+    made = folder / path.name
+    with path.open('rb') as file, made.open('wb') as copy:
+        end = _whole(file, file.seek(0, 2))
+        file.seek(0)
+        shutil.copyfileobj(file, copy)
+        copy.truncate(end)
+        copy.seek(end)
+        copy.write(_END)
+    return made

@@ -1,0 +1,157 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A rosbag2 that is on disk while it grows: by rosbag2_py where ROS has it, else by rosbags."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Protocol
+
+from lg_husky_sim.errors import MissingExtraError, RecordingError
+from lg_husky_sim.ros import api
+
+STORAGES = ('mcap', 'sqlite3')
+
+
+class BagWriter(Protocol):
+    """What a recorder needs of a bag."""
+
+    def add(self, topic: str, kind: str) -> None:
+        """Tell of a topic before its first message."""
+
+    def write(self, topic: str, nanoseconds: int, raw: bytes) -> None:
+        """Append a message as CDR, with the time at which it arrived [ns]."""
+
+    def flush(self) -> None:
+        """Have everything written so far in the file, whatever becomes of this process."""
+
+    def close(self) -> None:
+        """Complete the bag."""
+
+
+class Rosbag2Writer:
+    """
+    ROS's own writer.
+
+    Parameters
+    ----------
+    path : Path
+    storage : str
+
+    """
+
+    def __init__(self, path: Path, storage: str) -> None:
+        """Open the bag."""
+        self._module = rosbag2_py = import_module('rosbag2_py')
+        self._writer = rosbag2_py.SequentialWriter()
+        # Neither cache nor chunks: each message is in the file within a few kilobytes. The
+        # preset of that name means other things to sqlite3, whose default is safe already.
+        preset = 'fastwrite' if storage == 'mcap' else ''
+        self._writer.open(
+            rosbag2_py.StorageOptions(uri=str(path), storage_id=storage, max_cache_size=0,
+                                      storage_preset_profile=preset),
+            rosbag2_py.ConverterOptions('cdr', 'cdr'))
+        self._count = 0
+
+    def add(self, topic: str, kind: str) -> None:
+        """Tell of a topic before its first message."""
+        self._writer.create_topic(self._module.TopicMetadata(
+            id=self._count, name=topic, type=kind, serialization_format='cdr'))
+        self._count += 1
+
+    def write(self, topic: str, nanoseconds: int, raw: bytes) -> None:
+        """Append a message."""
+        self._writer.write(topic, raw, nanoseconds)
+
+    def flush(self) -> None:
+        """Do nothing: it holds nothing back."""
+
+    def close(self) -> None:
+        """Complete the bag."""
+        self._writer.close()
+
+
+class RosbagsWriter:
+    """
+    The writer of the package rosbags.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        ``mcap`` or ``sqlite3``.
+
+    """
+
+    def __init__(self, path: Path, kind: str) -> None:
+        """Open the bag."""
+        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.typesys import get_typestore, Stores
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        plugin = StoragePlugin.MCAP if kind == 'mcap' else StoragePlugin.SQLITE3
+        self._writer: Any = Writer(path, version=9, storage_plugin=plugin)
+        self._writer.open()
+        self._mcap = kind == 'mcap'
+        if not self._mcap:
+            # Pages go into the file with a commit only: a killed process leaves a whole file.
+            storage: Any = self._writer.storage
+            storage.conn.execute('PRAGMA cache_spill = OFF')
+        self._connections: dict[str, Any] = {}
+
+    def add(self, topic: str, kind: str) -> None:
+        """Tell of a topic before its first message."""
+        self._connections[topic] = self._writer.add_connection(topic, kind, typestore=self._store)
+
+    def write(self, topic: str, nanoseconds: int, raw: bytes) -> None:
+        """Append a message."""
+        self._writer.write(self._connections[topic], nanoseconds, raw)
+
+    def flush(self) -> None:
+        """Close the chunk or the transaction."""
+        storage = self._writer.storage
+        if not self._mcap:
+            storage.conn.commit()
+        elif storage.chunk.msgs:
+            storage.close_chunk()
+            storage.bio.flush()
+
+    def close(self) -> None:
+        """Complete the bag."""
+        self._writer.close()
+
+
+def bag_writer(path: Path, storage: str) -> BagWriter:
+    """
+    Open a new bag.
+
+    Parameters
+    ----------
+    path : Path
+        Folder to make.
+    storage : str
+        ``mcap`` or ``sqlite3``.
+
+    Raises
+    ------
+    RecordingError
+        If something is at the path, or the storage is unknown.
+    MissingExtraError
+        If nothing is installed that writes bags.
+
+    """
+    if storage not in STORAGES:
+        raise RecordingError(f'storage {storage!r} is unknown; there are {", ".join(STORAGES)}')
+    if path.exists() or path.is_symlink():
+        raise RecordingError(f'{path} exists already; choose another name or remove it')
+    if api.HAVE_RCLPY and find_spec('rosbag2_py') is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return Rosbag2Writer(path, storage)
+    if find_spec('rosbags') is None:
+        tail = (' or sudo apt install ros-jazzy-rosbag2-py ros-jazzy-rosbag2-storage-mcap'
+                if api.HAVE_RCLPY else '')
+        raise MissingExtraError(
+            f'nothing is installed that writes recordings: pip install rosbags{tail}')
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return RosbagsWriter(path, storage)

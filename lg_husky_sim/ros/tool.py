@@ -1,0 +1,266 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the live tools share: a node found its robot, a clock, and an orderly end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+import os
+import signal
+import time
+from types import FrameType, TracebackType
+from typing import Any
+
+from lg_husky_sim.errors import CommandError, SettingsError
+from lg_husky_sim.ros import api
+from lg_husky_sim.ros.graph import find_robots, Robot, the_one
+from lg_husky_sim.ros.settings import BY_NAME, DEFAULT_PRESET, make_settings, Settings
+
+#: Longest stay in one wait [s]; constant, for rclpy forgets who is ready when it changes.
+WAIT = 0.01
+#: Time between two looks at who is in the graph [s].
+LOOK = 0.1
+_ENDS = ('SIGINT', 'SIGTERM', 'SIGHUP')
+
+
+class Ended(Exception):
+    """Somebody asked the tool to end: a signal, or the death of the process that started it."""
+
+
+class Orderly:
+    """
+    Turns signals, and the death of the parent process, into a request to end.
+
+    A tool that moves a robot must still be in the graph when it is asked to end, so that it can
+    stop the robot; the middleware's own handlers would take it out. Use it as a context.
+    """
+
+    def __init__(self) -> None:
+        """Remember who started this process."""
+        self._before: dict[int, Any] = {}
+        self._parent = os.getppid()
+        self._asked = False
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        self._asked = True
+
+    def __enter__(self) -> Orderly:
+        """Take the signals."""
+        for name in _ENDS:
+            if hasattr(signal, name):
+                number = getattr(signal, name)
+                if name != 'SIGHUP' or signal.getsignal(number) != signal.SIG_IGN:
+                    self._before[number] = signal.signal(number, self._ask)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        """Give them back."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    @property
+    def over(self) -> bool:
+        """Whether the tool was asked to end."""
+        return self._asked or os.getppid() != self._parent
+
+    def check(self) -> None:
+        """
+        Go on, or end.
+
+        Raises
+        ------
+        Ended
+            If the tool was asked to.
+
+        """
+        if self.over:
+            raise Ended
+
+
+class Tool:
+    """
+    A node in the graph that serves a robot of a preset.
+
+    Parameters
+    ----------
+    name : str
+        Of the node.
+    orderly : Orderly
+    namespace : str, optional
+        Of the robot.
+
+    """
+
+    def __init__(self, name: str, orderly: Orderly, namespace: str | None = None) -> None:
+        """Join the graph."""
+        self.orderly = orderly
+        self.node = api.Node(name, namespace=namespace or '')
+        self._executor = api.SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self.simulated = bool(self.node.get_parameter('use_sim_time').value)
+
+    def now(self) -> float:
+        """Return the steady clock [s], or with ``use_sim_time`` the time of /clock."""
+        if self.simulated:
+            return float(self.node.get_clock().now().nanoseconds) * 1e-9
+        return time.monotonic()
+
+    def serve(self) -> None:
+        """
+        Serve what is ready, waiting for a short while.
+
+        Raises
+        ------
+        Ended
+            If the tool was asked to end.
+
+        """
+        self.orderly.check()
+        self._executor.spin_once(timeout_sec=WAIT)
+
+    def serve_until(self, moment: float) -> None:
+        """Serve callbacks until :meth:`now` has come to a moment [s]."""
+        while True:
+            left = moment - self.now()
+            if left <= 0.0:
+                return
+            if not self.simulated and left < 2.0 * WAIT:
+                self.orderly.check()
+                time.sleep(left)
+            else:
+                self.serve()
+
+    def settings(self, given: Mapping[str, object]) -> Settings:
+        """
+        Return the settings of the robot, with what ``-p`` gives over what the caller gives.
+
+        Parameters of other nodes are none of ours, as everywhere in ROS.
+        """
+        own = {name: one.value for name, one in api.parameter_overrides(self.node).items()
+               if name in BY_NAME}
+        return make_settings({**given, **own})
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+
+def _said(arguments: Sequence[str], name: str) -> str | None:
+    # The value of a remapping such as __ns:=/a, or of a parameter, in --ros-args.
+    for word in arguments:
+        left, mark, right = word.partition(':=')
+        if mark and left == name:
+            return right
+    return None
+
+
+@contextmanager
+def joined(arguments: Sequence[str] = ()) -> Iterator[Orderly]:
+    """
+    Join the graph and leave it again, whatever happens.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        What stands behind ``--ros-args``.
+
+    """
+    with Orderly() as orderly:
+        try:
+            api.join(['lg_husky', '--ros-args', *arguments])
+            yield orderly
+        except api.ROS_ERRORS as error:
+            raise SettingsError(' '.join(str(error).split())) from error
+        finally:
+            api.try_shutdown()
+
+
+def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wait: float
+             ) -> Robot | None:
+    """
+    Look for the Husky in the graph.
+
+    Parameters
+    ----------
+    orderly : Orderly
+    preset, namespace : str, optional
+        Look for these only.
+    wait : float
+        How long to look [s]; once one is seen, a second longer for others.
+
+    Returns
+    -------
+    Robot or None
+        None where there is none.
+
+    Raises
+    ------
+    SettingsError
+        If there are several.
+
+    """
+    tool = Tool('lg_husky_look', orderly)
+    try:
+        end = time.monotonic() + wait
+        seen = None
+        while True:
+            topics = dict(tool.node.get_topic_names_and_types())
+            robot = the_one(find_robots(topics, preset=preset, namespace=namespace))
+            if robot is not None and seen is None:
+                seen = time.monotonic()
+                end = seen + min(1.0, wait)
+            if time.monotonic() >= end:
+                return robot
+            until = time.monotonic() + LOOK
+            while time.monotonic() < until:
+                tool.serve()
+    finally:
+        tool.close()
+
+
+def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = None,
+           namespace: str | None = None, wait: float = 10.0) -> tuple[str, str | None]:
+    """
+    Return preset and namespace of the robot to serve.
+
+    What the command line says counts, then what ROS arguments say, then ``ROS_NAMESPACE``, then
+    the only Husky in the graph.
+
+    Parameters
+    ----------
+    orderly : Orderly
+    arguments : sequence of str
+        What stands behind ``--ros-args``.
+    preset, namespace : str, optional
+        From the command line.
+    wait : float
+        How long to look for a Husky [s].
+
+    Raises
+    ------
+    CommandError
+        If there is no Husky in the graph.
+    SettingsError
+        If there are several, or the preset is unknown.
+
+    """
+    preset = preset or _said(arguments, 'preset')
+    if preset is not None:
+        BY_NAME['preset'].checked(preset)
+    remapped = _said(arguments, '__ns')
+    place = namespace or remapped or os.environ.get('ROS_NAMESPACE') or None
+    if preset is None or place is None:
+        robot = look_for(orderly, preset=preset, namespace=place, wait=wait if preset is None
+                         else min(wait, 1.0))
+        if robot is not None:
+            preset, place = robot.preset, place or robot.namespace
+        elif preset is None:
+            where = f'below {place} ' if place else ''
+            raise CommandError(
+                f'no Husky is {where}in the graph ({api.describe_backend()}) after {wait:g} s; '
+                f'start it, or name its topics: --preset {DEFAULT_PRESET} or '
+                f'{", ".join(BY_NAME["preset"].choices[1:])}')
+    return preset, None if remapped and not namespace else place

@@ -1,0 +1,273 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The live tools on a robot: they stop it, find it, hear it and lose nothing of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+from lg_husky_sim.errors import CommandError, RecordingError, SettingsError
+from lg_husky_sim.manoeuvres import Manoeuvre, Step
+from lg_husky_sim.ros import api
+from lg_husky_sim.ros.commands import ZEROS
+from lg_husky_sim.ros.driver import drive
+from lg_husky_sim.ros.graph import find_robots, the_one
+from lg_husky_sim.ros.settings import make_settings
+from lg_husky_sim.ros.tool import Ended, Orderly, Tool
+from lg_husky_sim.testing.live import LiveHusky, Probe, probed_domain
+import pytest
+
+FAST = Manoeuvre('fast', (Step(20.0, 3.0, -4.0),))
+COMMAND = '/husky_velocity_controller/cmd_vel'
+#: A parent that starts a tool and dies without a word.
+CRUEL_PARENT = """
+import os, subprocess, sys
+subprocess.Popen([sys.executable, '-m', 'lg_husky_sim.cli.main', *sys.argv[1:]],
+                 stdin=subprocess.DEVNULL)
+sys.stdin.readline()
+os._exit(9)
+"""
+
+
+@pytest.fixture
+def probe() -> Iterator[Probe]:
+    """Return a probe in a domain of the test's own: who listens is what these tests ask."""
+    with probed_domain() as one:
+        yield one
+
+
+def run(*words: str | Path, **options: Any) -> subprocess.Popen[str]:
+    """Start a verb in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, '-u', '-m', 'lg_husky_sim.cli.main', *map(str, words)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def speeds(heard: Sequence[Any]) -> list[tuple[float, float]]:
+    """Return forward speed and yaw rate of each command."""
+    return [(message.linear.x, message.angular.z) for message in heard]
+
+
+def ended_with_zeros(heard: Sequence[Any]) -> bool:
+    """Return whether the robot was moved, and told to stop last."""
+    told = speeds(heard)
+    return any(one != (0.0, 0.0) for one in told) and told[-ZEROS:] == [(0.0, 0.0)] * ZEROS
+
+
+@pytest.mark.parametrize('end', ['SIGINT', 'SIGTERM', 'parent'])
+def test_a_drive_that_is_ended_stops_the_robot(probe: Probe, tmp_path: Path, end: str) -> None:
+    """Row 16: the last commands were 0.8 m/s after Ctrl-C."""
+    script = tmp_path / 'fast.yaml'
+    script.write_text('schema: lg_husky_sim/commands/1\nrate: 20\nsteps:\n'
+                      '  - {duration: 60.0, forward: 0.8, yaw: 0.3}\n', encoding='utf-8')
+    heard = probe.listen('geometry_msgs/msg/Twist', COMMAND)
+    words = ['drive', str(script), '--preset', 'paper', '--wait', '30']
+    if end == 'parent':
+        process = subprocess.Popen([sys.executable, '-c', CRUEL_PARENT, *words],
+                                   stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    else:
+        process = run(*words)
+    try:
+        assert probe.until(lambda: len(heard) > 10, 30.0), process.poll()
+        if end == 'parent':
+            assert process.stdin is not None
+            process.stdin.write('\n')
+            process.stdin.flush()
+        else:
+            process.send_signal(getattr(signal, end))
+        assert probe.until(lambda: ended_with_zeros(heard), 15.0), speeds(heard)[-3:]
+        _, said = process.communicate(timeout=15.0)
+        count = len(heard)
+        probe.spin(0.3)
+        assert len(heard) == count
+    finally:
+        process.kill()
+        process.wait()
+    assert f'{COMMAND} moves /probe (Twist); no limit in this preset' in said
+    assert 'Traceback' not in said
+    if end != 'parent':
+        assert process.returncode == 130
+
+
+def test_commands_stay_within_the_limits_and_an_error_stops_the_robot(probe: Probe) -> None:
+    """Row 16: 3 m/s and −4 rad/s become the preset's 1 m/s and −2 rad/s; zero comes last."""
+    heard = probe.listen('geometry_msgs/msg/Twist', COMMAND)
+    said: list[str] = []
+    tool = Tool('lg_husky_driver', Orderly())
+
+    def fail(moment: float) -> None:
+        if moment > 0.3:
+            raise ZeroDivisionError
+
+    try:
+        with pytest.raises(ZeroDivisionError):
+            drive(tool, FAST, make_settings(preset='husky_ros1'), say=said.append,
+                  progress=fail)
+    finally:
+        tool.close()
+    probe.spin(0.2)
+    assert set(speeds(heard)) == {(1.0, -2.0), (0.0, 0.0)}
+    assert ended_with_zeros(heard)
+    assert said == [f'{COMMAND} moves /probe (Twist); at most 1 m/s, at most 2 rad/s']
+
+
+def test_a_recorder_is_no_robot_and_another_type_is_named(probe: Probe, tmp_path: Path) -> None:
+    """Who only listens is not moved; Twist and TwistStamped do not hear each other."""
+    tool = Tool('lg_husky_recorder', Orderly())
+    settings = make_settings(command_topic='/b/cmd_vel')
+    tool.node.create_subscription(
+        api.message_type('geometry_msgs/msg/Twist'), '/b/cmd_vel', print, 10)
+    stamped = probe.listen('geometry_msgs/msg/TwistStamped', '/c/cmd_vel')
+    driver = Tool('lg_husky_driver', Orderly())
+    try:
+        with pytest.raises(CommandError, match=r'nobody listens to /b/cmd_vel \(Twist\)'):
+            drive(driver, FAST, settings, wait=0.5)
+        with pytest.raises(CommandError, match='/probe listens to TwistStamped there'):
+            drive(driver, FAST, make_settings(command_topic='/c/cmd_vel'), wait=0.5)
+    finally:
+        driver.close()
+        tool.close()
+    assert not stamped
+
+
+def test_a_tool_that_is_asked_to_end_says_so_once_signals_are_taken(probe: Probe) -> None:
+    """Signals and the death of the parent are requests, not the end of the graph."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        with Orderly() as orderly:
+            orderly.check()
+            os.kill(os.getpid(), number)
+            with pytest.raises(Ended):
+                orderly.check()
+        assert api.ok()
+
+
+TOPICS = {
+    '/a200_0000/platform/cmd_vel': ['geometry_msgs/msg/TwistStamped'],
+    '/a200_0000/platform/odom': ['nav_msgs/msg/Odometry'],
+    '/a200_0000/sensors/imu_0/data': ['sensor_msgs/msg/Imu'],
+    '/turtle/joint_states': ['sensor_msgs/msg/JointState'],
+    '/turtle/imu/data': ['sensor_msgs/msg/Imu'],
+    '/odd/platform/cmd_vel': ['geometry_msgs/msg/Twist'],
+}
+
+
+def test_huskies_are_found_by_names_and_types_together() -> None:
+    """Row 17: another robot, or another type of the same name, is no Husky."""
+    robot = the_one(find_robots(TOPICS))
+    assert robot is not None
+    assert robot.words() == '--preset clearpath_jazzy --namespace /a200_0000'
+    assert find_robots(TOPICS, preset='paper') == ()
+    assert find_robots(TOPICS, namespace='a200_0000') == (robot,)
+    assert the_one(find_robots({})) is None
+    both = TOPICS | {f'/{make_settings(preset="husky_ros1").odometry_topic}': [
+        'nav_msgs/msg/Odometry'], '/imu/data': ['sensor_msgs/msg/Imu']}
+    with pytest.raises(SettingsError, match='2 Huskies are in the graph, choose one: --preset '
+                       'husky_ros1; --preset clearpath_jazzy --namespace /a200_0000'):
+        the_one(find_robots(both))
+
+
+def test_a_namespaced_robot_is_found_recorded_and_named_if_there_are_two(
+        start: Callable[..., LiveHusky], probe: Probe, tmp_path: Path) -> None:
+    """Row 17: /a200_0000 needs no option; of two, each is listed with its own."""
+    heard = probe.listen('nav_msgs/msg/Odometry', '/a200_0000/platform/odom')
+    husky = start(arguments=('-r', '__ns:=/a200_0000'), preset='clearpath_jazzy')
+    husky.ready(heard)
+    recorder = run('record', tmp_path / 'bag', '--seconds', '1.5')
+    out, said = recorder.communicate(timeout=60.0)
+    assert recorder.returncode == 0, said
+    assert '/a200_0000/platform/odom' in out
+    from lg_husky_sim.recording import read_recording
+    assert set(read_recording(tmp_path / 'bag').streams) >= {'wheels', 'imu'}
+    other = probe.listen('nav_msgs/msg/Odometry', '/b/husky_velocity_controller/odom')
+    start(arguments=('-r', '__ns:=/b')).ready(other)
+    two = run('record', tmp_path / 'two')
+    _, said = two.communicate(timeout=60.0)
+    assert (two.returncode, said) == (
+        1, 'error: 2 Huskies are in the graph, choose one: --preset clearpath_jazzy --namespace '
+        '/a200_0000; --preset paper --namespace /b\n')
+    words = ('drive', 'circle', '--ros-args', '-r', '__ns:=/a200_0000', '-p', 'max_forward:=0.1')
+    driver = run(*words, env=os.environ | {'ROS_NAMESPACE': '/b'})
+    told = probe.listen('geometry_msgs/msg/TwistStamped', '/a200_0000/platform/cmd_vel')
+    try:
+        assert probe.until(lambda: told, 30.0)
+        driver.send_signal(signal.SIGINT)
+        _, said = driver.communicate(timeout=10.0)
+    finally:
+        driver.kill()
+        driver.wait()
+    assert '/a200_0000/platform/cmd_vel moves' in said
+    assert 'at most 0.1 m/s' in said
+    assert max(message.twist.linear.x for message in told) <= 0.1
+
+
+def test_a_tool_without_a_robot_says_so(probe: Probe, tmp_path: Path) -> None:
+    """Rows 17 and 20: one line with what to do, and nothing is written."""
+    lonely = run('record', tmp_path / 'bag', '--wait', '0.5', '--namespace', '/nobody')
+    _, said = lonely.communicate(timeout=60.0)
+    assert lonely.returncode == 1
+    assert said.startswith('error: no Husky is below /nobody in the graph (backend ')
+    assert not (tmp_path / 'bag').exists()
+    empty = run('record', tmp_path / 'bag', '--preset', 'husky_ros1', '--namespace', '/nobody',
+                '--seconds', '0.5')
+    _, said = empty.communicate(timeout=60.0)
+    assert empty.returncode == 1
+    assert 'error: nothing came on /nobody/husky_velocity_controller/cmd_vel, ' in said
+    assert not (tmp_path / 'bag').exists()
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_best_effort_publishers_are_recorded_and_kill_9_loses_a_second_at_most(
+        probe: Probe, tmp_path: Path, storage: str) -> None:
+    """Rows 18 and 19: SensorDataQoS is heard; what a killed recorder leaves can be read."""
+    imu, message = probe.talk('sensor_msgs/msg/Imu', f'/{storage}/imu',
+                              api.qos_profile_sensor_data)
+    recorder = run('record', tmp_path / 'bag', '--preset', 'paper', '--storage', storage,
+                   '--ros-args', '-p', f'imu_topic:=/{storage}/imu')
+    sent = 0
+
+    def publish(until: float) -> None:
+        nonlocal sent
+        while time.monotonic() < until:
+            one = message()
+            one.header.stamp.sec, one.header.stamp.nanosec = divmod(time.time_ns(), 10**9)
+            one.angular_velocity.z = float(sent)
+            imu.publish(one)
+            sent += 1
+            probe.spin(0.02)
+
+    try:
+        assert probe.until(lambda: imu.get_subscription_count() > 0, 30.0)
+        publish(time.monotonic() + 3.0)
+    finally:
+        recorder.kill()
+        recorder.wait()
+    from lg_husky_sim.recording import read_recording
+    read = read_recording(tmp_path / 'bag')
+    rates = read.streams['imu'].column('yaw_rate')
+    assert rates[-1] > sent - 1 - 60
+    assert len(rates) > 60
+    if storage == 'mcap':
+        assert read.notes[0] == 'bag.mcap was cut off: read up to its last whole chunk'
+
+
+def test_a_recording_of_nothing_is_an_error(probe: Probe, tmp_path: Path) -> None:
+    """It lists what is in the graph instead, and leaves no folder."""
+    from lg_husky_sim.ros.recorder import record
+    probe.talk('std_msgs/msg/Bool', '/something_else')
+    tool = Tool('lg_husky_recorder', Orderly())
+    try:
+        with pytest.raises(RecordingError, match=r'nothing came .* /something_else'):
+            record(tool, tmp_path / 'bag', make_settings(
+                command_topic='n/a', odometry_topic='n/b', ground_truth_topic='n/c',
+                joint_states_topic='n/d', imu_topic='n/e', battery_topic='n/f'), seconds=0.4)
+    finally:
+        tool.close()
+    assert list(tmp_path.iterdir()) == []
