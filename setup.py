@@ -28,7 +28,7 @@ EXTRAS = {
     'engine': ['mujoco>=3.1'],
     'scale': ['dask[distributed]>=2024.1'],
     'search': ['deap>=1.4'],
-    'report': ['jinja2>=3.1'],
+    'report': ['jinja2>=3.1', 'plotly>=6.0'],
     'tables': ['control>=0.10', 'pandas>=2.0'],
 }
 EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report', 'search')

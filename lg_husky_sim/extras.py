@@ -19,6 +19,7 @@ EXTRA_OF = {
     'mujoco': 'engine',
     'numba': 'fast',
     'pandas': 'tables',
+    'plotly': 'report',
     'rosbags': 'bags',
 }
 """Importable module to the extra of setup.py that brings it."""

@@ -16,7 +16,7 @@ MAX_LINES = 400
 
 BASE = {'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'resources', 'signals', 'yaml_files'}
 MODEL = {'linear_graph', 'husky', 'simulation'}
-DATA = MODEL | {'recording', 'comparison'}
+DATA = MODEL | {'recording', 'comparison', 'reporting'}
 MAY_IMPORT: dict[str, set[str]] = {
     'errors': set(),
     'signals': {'errors', 'extras'},
@@ -30,7 +30,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     'husky': {'linear_graph'},
     'simulation': {'linear_graph', 'husky'},
     'recording': set(),
-    'comparison': MODEL | {'recording'},
+    'reporting': set(),
+    'comparison': MODEL | {'recording', 'reporting'},
     'identification': DATA,
     'diagnosis': DATA | {'identification'},
     'proof': DATA | {'identification', 'diagnosis'},
@@ -52,7 +53,7 @@ OWNERS = {
 rosbags, and proof writes bags with code of its own, as the blind trial shares none."""
 
 ONLY_INSIDE_FUNCTIONS = {'sympy', 'matplotlib', 'mujoco', 'dask', 'distributed', 'rosbags',
-                         'cyclonedds', 'jinja2', 'pandas', 'control'}
+                         'cyclonedds', 'jinja2', 'pandas', 'control', 'plotly', 'PIL'}
 """Slow to import or optional: the package imports without them. The
 backends of ros are chosen at run time, each in files of its own that import what they need."""
 

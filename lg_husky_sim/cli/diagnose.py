@@ -53,8 +53,9 @@ def command(
     from lg_husky_sim.diagnosis.workers import Workers
     from lg_husky_sim.folders import check_folder, result_folder
     from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
-    from lg_husky_sim.identification.pages import check_extras
     from lg_husky_sim.recording import read_recording, TopicMap
+    from lg_husky_sim.reporting.provenance import given_command, provenance
+    from lg_husky_sim.reporting.write import check_extras
     from tqdm import tqdm
 
     del seed
@@ -77,10 +78,14 @@ def command(
         progress('report and pictures' if with_report else 'files', 0.95)
         try:
             with result_folder(out, MARKER) as folder:
-                write_files(folder, case, with_report)
+                failure = write_files(folder, case, with_report, provenance(
+                    [(one.name, one.path) for one in (*before, *after)],
+                    [('of --robot', robot)] if robot else [], given_command()))
         finally:  # the answer is worth a minute, whatever becomes of the files
             bar.close()
             if baselines:
                 click.echo(f'before: {", ".join(baselines)}; after: {", ".join(recordings)}')
             click.echo(summary_text(case.diagnosis))
-    click.echo(f'{out / ("report.html" if with_report else MARKER)}')
+    if failure:
+        click.echo(f'warning: {failure}', err=True)
+    click.echo(f'{out / ("report.html" if with_report and not failure else MARKER)}')

@@ -143,12 +143,37 @@ def predicted_at(prediction: TimeSeries, name: str, times: FloatArray) -> FloatA
     return result
 
 
-def channel_errors(segment: Segment, prediction: TimeSeries) -> dict[str, SquareSum]:
+def channel_pairs(segment: Segment, prediction: TimeSeries
+                  ) -> dict[str, tuple[FloatArray, FloatArray, FloatArray]]:
     """
-    Sum up the squared errors of each channel that was measured and predicted.
+    Return each channel that was measured beside its prediction.
 
     Where the measured rate is a derivative of the pose, the predicted one is the same derivative
     of the predicted pose, so that a perfect model has no error.
+
+    Parameters
+    ----------
+    segment : Segment
+    prediction : TimeSeries
+        Columns of the simulator.
+
+    Returns
+    -------
+    dict of str to tuple of numpy.ndarray, shape (n,)
+        Times [s], measured and predicted values by channel; what is not predicted is NaN.
+    """
+    from_pose = pose_rates(segment, prediction)
+    found = {}
+    for name, series in measured_channels(segment).items():
+        derived = name == 'forward' or (name == 'yaw_rate' and 'imu' not in segment.streams)
+        predicted = predicted_at(from_pose if derived else prediction, name, series.times)
+        found[name] = (series.times, series.values[:, 0], predicted)
+    return found
+
+
+def channel_errors(segment: Segment, prediction: TimeSeries) -> dict[str, SquareSum]:
+    """
+    Sum up the squared errors, measured minus predicted, of each channel that has both.
 
     Parameters
     ----------
@@ -162,13 +187,8 @@ def channel_errors(segment: Segment, prediction: TimeSeries) -> dict[str, Square
         Keys in the order of ``UNITS``; wheel_speed pools both sides, position both axes (its
         root mean square is that of the distance).
     """
-    from_pose = pose_rates(segment, prediction)
-    errors: dict[str, FloatArray] = {}
-    for name, series in measured_channels(segment).items():
-        derived = name == 'forward' or (name == 'yaw_rate' and 'imu' not in segment.streams)
-        predicted = predicted_at(from_pose if derived else prediction, name, series.times)
-        errors[name] = predicted - series.values[:, 0]
-    sums = {name: _square_sum(error) for name, error in errors.items()}
+    sums = {name: _square_sum(measured - predicted) for name, (_, measured, predicted)
+            in channel_pairs(segment, prediction).items()}
     if 'wheel_left' in sums:
         sums['wheel_speed'] = sums['wheel_left'] + sums['wheel_right']
     if 'x' in sums:

@@ -8,15 +8,18 @@ import json
 from pathlib import Path
 
 from lg_husky_sim.diagnosis.diagnose import Case
-from lg_husky_sim.diagnosis.report import write_report
+from lg_husky_sim.diagnosis.report_of_case import case_report
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Verdict
 from lg_husky_sim.husky.model_file import save_model
+from lg_husky_sim.reporting.data import Provenance
+from lg_husky_sim.reporting.words import quantity_with_unit
+from lg_husky_sim.reporting.write import write_report
 
 #: File that marks a folder of this kind.
 MARKER = 'diagnosis.json'
-_ROWS = (('position_rmse_m', 'position [m]'), ('wheel_speed_rmse', 'wheel speed [rad/s]'),
-         ('yaw_rate_rmse', 'yaw rate [rad/s]'), ('forward_rmse', 'forward speed [m/s]'),
-         ('max_abs_x_m', 'largest |X| [m]'), ('max_abs_y_m', 'largest |Y| [m]'))
+_ROWS = tuple((key, quantity_with_unit(key)) for key in (
+    'position_rmse_m', 'wheel_speed_rmse', 'yaw_rate_rmse', 'forward_rmse', 'max_abs_x_m',
+    'max_abs_y_m'))
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -74,9 +77,10 @@ def summary_text(diagnosis: Diagnosis) -> str:
     return '\n'.join(lines)
 
 
-def write_files(folder: Path, case: Case, with_report: bool = True) -> None:
+def write_files(folder: Path, case: Case, with_report: bool = True,
+                provenance: Provenance | None = None) -> str:
     """
-    Write the files of a diagnosis.
+    Write the files of a diagnosis, results first.
 
     Parameters
     ----------
@@ -85,18 +89,23 @@ def write_files(folder: Path, case: Case, with_report: bool = True) -> None:
     case : Case
     with_report : bool
         Whether to write report.html and the pictures too.
+    provenance : Provenance, optional
 
-    Raises
-    ------
-    MissingExtraError
-        If the report cannot be made.
+    Returns
+    -------
+    str
+        Why there is no report, if one was asked for and cannot be made; empty otherwise.
     """
     diagnosis = case.diagnosis
-    if with_report:
-        write_report(folder, case, headline(diagnosis))
     save_model(diagnosis.model, folder / 'model.yaml')
     save_model(diagnosis.plain_model, folder / 'plain.yaml')
     (folder / 'diagnosis.txt').write_text(summary_text(diagnosis) + '\n', encoding='utf-8')
     (folder / MARKER).write_text(
         json.dumps(diagnosis_data(diagnosis), indent=1, ensure_ascii=False, allow_nan=False)
         + '\n', encoding='utf-8')
+    if with_report:
+        try:
+            write_report(case_report(case, provenance), folder)
+        except Exception as error:  # the answer is worth more than its report
+            return f'report.html could not be made: {type(error).__name__}: {error}'
+    return ''

@@ -1,309 +1,318 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a diagnosis: one page that needs nothing else, and its pictures as files."""
+"""A diagnosis as the values of a report: headline, advice, numbers, competing effects."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 import math
-from pathlib import Path
-import re
-from typing import Any, TYPE_CHECKING
 
-from lg_husky_sim.comparison.figures import line_styles, trajectory_figure
-from lg_husky_sim.comparison.metrics import tracking
-from lg_husky_sim.comparison.replay import replay
-from lg_husky_sim.diagnosis.diagnose import Case
-from lg_husky_sim.diagnosis.figures import (
-    before_after_figure,
-    channel_rows,
-    graph_figure,
-    intervals_figure,
-    labels_of,
-    new_elements,
-    rivals_figure,
+from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
+from lg_husky_sim.husky.effects import effect_kind, Onset, OnsetKind
+from lg_husky_sim.reporting.advice import filled
+from lg_husky_sim.reporting.data import (
+    Advice,
+    ErrorTable,
+    Headline,
+    Mismatch,
+    NOMINAL,
+    ParameterRow,
+    Provenance,
+    RECALIBRATED,
+    ReportData,
+    Trace,
+    View,
+    WITH_FINDING,
 )
-from lg_husky_sim.diagnosis.figures_where import effort_figure, where_figure
-from lg_husky_sim.diagnosis.held_out import errors, LONGEST, plant_of
-from lg_husky_sim.diagnosis.locate import locate, Located
-from lg_husky_sim.diagnosis.planning import named_drive
-from lg_husky_sim.diagnosis.result import Estimate, Finding, Verdict
-from lg_husky_sim.husky.effects import effect_kind
-from lg_husky_sim.husky.model import compile_model
-from lg_husky_sim.husky.model_file import ModelFile
-from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.identification.pages import check_extras, Picture, picture
-from lg_husky_sim.recording import Segment, windows
-import numpy as np
+from lg_husky_sim.reporting.sections import Cell, Section, Table, Tone
+from lg_husky_sim.reporting.words import capitalised, change, number, plural
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-#: Rows of the tables of errors: key and words.
-ERRORS = (('position_rmse_m', 'position [m]'), ('wheel_speed_rmse', 'wheel speed [rad/s]'),
-          ('yaw_rate_rmse', 'yaw rate [rad/s]'), ('forward_rmse', 'forward speed [m/s]'),
-          ('max_abs_x_m', 'largest |X| [m]'), ('max_abs_y_m', 'largest |Y| [m]'))
-#: Most rows of the table of mismatches.
-MOST = 20
-#: Factor of a law that is switched off (no Stribeck share).
-_ABSENT = re.compile(r'\(1\+\(0\.0\)\*exp\([^*]*\*\*2\)\)\*')
-_WORDS = {Verdict.NOTHING_MISSING: 'Nothing is missing',
-          Verdict.KNOWN: 'Something is missing, and it has a name',
-          Verdict.UNKNOWN: 'Something is missing, and it is none of the known effects'}
+#: A held-out error that grows by more than this share is said before anything else.
+LOSS = 0.05
+_STREAMS = {'wheels': 'the wheels (`/joint_states`)', 'imu': 'the IMU',
+            'pose': 'the pose (`/tf`, odometry)'}
+_WHEELS = {'left': 'the left wheels', 'right': 'the right wheels'}
+_AMPLITUDE, _PHASE = 'amplitude', 'phase'
+#: Signals of the page by the channels of a diagnosis that are rates of the pose.
+_SIGNALS = {'advance': 'forward', 'turn': 'yaw_rate'}
 
 
-@dataclass(frozen=True)
-class Change:
-    """A row of a table of errors before and after."""
-
-    name: str
-    before: str
-    after: str
-    change: str
-    better: bool
-
-
-def write_report(folder: Path, case: Case, headline: str) -> tuple[Path, ...]:
+def sizes(finding: Finding) -> tuple[Estimate, ...]:
     """
-    Write report.html and the pictures.
+    Return the numbers of a finding; cosine and sine of a ripple as amplitude and phase.
 
     Parameters
     ----------
-    folder : pathlib.Path
-        An existing folder.
-    case : Case
-    headline : str
-        The answer in one sentence.
+    finding : Finding
 
     Returns
     -------
-    tuple of pathlib.Path
-        The pictures.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib or jinja2 is not installed.
+    tuple of Estimate
+        Intervals of amplitude and phase by propagation, cosine and sine taken as independent.
     """
-    check_extras()
-    located = locate(case.search.observations, case.search.plain)
-    pictures = _pictures(case, located)
-    for one in pictures.values():
-        (folder / f'{one.name}.png').write_bytes(one.png)
-    (folder / 'report.html').write_text(page(case, located, pictures, headline),
-                                        encoding='utf-8')
-    return tuple(folder / f'{one.name}.png' for one in pictures.values())
+    known = {one.name: one for one in finding.parameters}
+    cosine, sine = known.get('ripple_cos'), known.get('ripple_sin')
+    if cosine is None or sine is None:
+        return finding.parameters
+    size = math.hypot(cosine.value, sine.value)
+    half = [0.5 * (one.high - one.low) for one in (cosine, sine)]
+    parts = (cosine.value / size, sine.value / size) if size else (1.0, 0.0)
+    wide = math.hypot(parts[0] * half[0], parts[1] * half[1])
+    turn = math.hypot(parts[1] * half[0], parts[0] * half[1]) / size if size else math.pi
+    angle = math.atan2(sine.value, cosine.value)
+    return (Estimate(_AMPLITUDE, size, cosine.unit, max(0.0, size - wide), size + wide),
+            Estimate(_PHASE, angle, 'rad', angle - turn, angle + turn),
+            *(one for one in finding.parameters if one not in (cosine, sine)))
 
 
-def _pictures(case: Case, located: Located) -> dict[str, Picture]:
-    diagnosis = case.diagnosis
-    structure = diagnosis.model.structure
-    culprits = {f.subsystem for f in diagnosis.findings}
-    with_it = labels_of(case)[1].replace('_', ' ')
-    found: dict[str, Picture] = {}
-
-    def keep(key: str, figure: Figure | None, caption: str) -> None:
-        if figure is not None:
-            found[key] = picture(figure, caption, key)
-
-    keep('before_after', before_after_figure(case, located),
-         'The channel in which it shows most: measured, as the recalibrated model has it'
-         + (f', and {with_it}.' if labels_of(case)[1] != labels_of(case)[0] else '.')
-         + ' Below, what is left.')
-    keep('where', where_figure(located, culprits, structure.onset),
-         'How much of what the recalibrated model leaves a missing effort in each part of the '
-         'robot would explain, over time' + (
-             ', and of each part relative to the best one; the named part is red. Parts that act '
-             'through the same balance light up together.' if located.certain else
-             ': nothing beyond what healthy recordings leave.') + ' Below: the commands.')
-    keep('effort', effort_figure(located),
-         'The missing effort that fits best, as a smoother sees it (band: two standard '
-         'deviations), and the quantity that it goes with; points are moments, the line their '
-         'mean.')
-    keep('trajectory', _trajectory(case),
-         'The way driven, and as both models predict it from the commands alone.')
-    elements = [e for f in diagnosis.findings for e in f.elements]
-    added = new_elements(diagnosis.plain_model.structure, structure)[1]
-    keep('graph', graph_figure(diagnosis.plain_model.structure, structure, elements),
-         'The linear graph of the robot' + (
-             '; branches that the finding touches are red' if elements else '') + (
-             f', new ones dashed: {", ".join(added)}.' if added else '.'))
-    keep('rivals', rivals_figure(case),
-         'What was tried, and how much better each predicts data that were not fitted.')
-    keep('intervals', intervals_figure(case),
-         'What the recalibration moved, together with what was found.')
-    return found
+def effect_words(finding: Finding) -> str:
+    """Return effect and side in words, such as ``torque ripple, left side``."""
+    name = 'an unknown effect' if finding.effect == 'unknown' else finding.effect.replace('_', ' ')
+    side = {'left': ', left side', 'right': ', right side'}.get(finding.side, '')
+    return name + side
 
 
-def _plant(model: ModelFile) -> Plant:
-    return compile_model(model.structure).at(model.parameters)
+def onset_words(onset: Onset | None) -> str:
+    """Return when or where an effect acts, in words."""
+    if onset is None:
+        return 'always'
+    if onset.kind is OnsetKind.TIME:
+        where = f' of {onset.recording}' if onset.recording else ' of each recording'
+        return f'from {onset.value:.1f} s{where}'
+    side = 'above' if onset.kind is OnsetKind.PLACE_ABOVE else 'below'
+    return f'where x is {side} {number(onset.value)} m'
 
 
-def _trajectory(case: Case) -> Figure | None:
-    # The stretch of the recordings in which the predicted way changes most.
-    models = {labels_of(case)[0]: plant_of(case.search.plain)}
-    if labels_of(case)[1] not in models:
-        models[labels_of(case)[1]] = _plant(case.diagnosis.model)
-    whole = case.search.observations
-    best: tuple[float, Segment, dict[str, Any]] | None = None
-    for segment in case.segments:
-        if 'pose' not in segment.streams:
+def size_words(one: Estimate) -> str:
+    """Return a number with its name and interval."""
+    unit = '' if one.unit in ('', '1') else f' {one.unit}'
+    interval = f' ({number(one.low)} to {number(one.high)})' if (
+        math.isfinite(one.low) and math.isfinite(one.high)) else ''
+    return f'{one.name.replace("_", " ")} {number(one.value)}{unit}{interval}'
+
+
+def headline(diagnosis: Diagnosis, warnings: Sequence[str] = ()) -> Headline:
+    """
+    Return the answer in thirty seconds.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    warnings : sequence of str
+        What speaks against it.
+
+    Returns
+    -------
+    Headline
+    """
+    found, sure = diagnosis.findings, ('Confidence', f'{100.0 * diagnosis.confidence:.0f} %')
+    sentences = tuple(one.statement for one in found)
+    match diagnosis.verdict:
+        case Verdict.NOTHING_MISSING:
+            return Headline('No missing physics found', Tone.GOOD, (sure,),
+                            ('The recalibrated model explains the recordings.',),
+                            tuple(warnings))
+        case Verdict.UNKNOWN:
+            parts = ', '.join(dict.fromkeys(one.subsystem for one in found))
+            return Headline('Something is missing that is none of the known effects', Tone.BAD,
+                            (('Effect', 'none of the catalogue'),
+                             ('Part of the robot', parts or '–'), sure),
+                            sentences, tuple(warnings))
+        case Verdict.KNOWN:
+            what = '; '.join(effect_words(one) for one in found)
+            noun = 'effect' if len(found) == 1 else 'effects'
+            facts = tuple(fact for one in found for fact in _facts(one, len(found) > 1))
+            return Headline(f'Missing {noun} found: {what}', Tone.FOUND, (*facts, sure),
+                            sentences, tuple(warnings))
+
+
+def _facts(finding: Finding, several: bool) -> tuple[tuple[str, str], ...]:
+    # The phase of a ripple says where on the wheel, not how large.
+    words = '; '.join(size_words(one) for one in sizes(finding) if one.name != _PHASE) or '–'
+    if several:
+        return ((f'Size of {effect_words(finding)}', words),)
+    side = finding.side if finding.side in ('left', 'right', 'both') else 'whole robot'
+    return (('Effect', finding.effect.replace('_', ' ')), ('Side', side), ('Size', words),
+            ('Acts', onset_words(finding.onset)))
+
+
+def losses(tables: Sequence[ErrorTable]) -> tuple[str, ...]:
+    """
+    Return a warning for the held-out errors that grow with what was found.
+
+    Parameters
+    ----------
+    tables : sequence of ErrorTable
+
+    Returns
+    -------
+    tuple of str
+        At most one, with all of them.
+    """
+    worse = []
+    for table in tables:
+        if not table.held_out or table.compared is None:
             continue
-        long = segment.duration > 1.5 * LONGEST
-        for part in (windows(segment, LONGEST)[:3] if long else (segment,)):
-            tracks = {label: tracking(part, replay(whole.plant_in(plant, part.recording), part))
-                      for label, plant in models.items()}
-            sums = [track.absolute_sum for track in tracks.values()]
-            gain = sums[0] - sums[-1] if len(sums) > 1 else sums[0]
-            if math.isfinite(gain) and (best is None or gain > best[0]):
-                best = (gain, part, tracks)
-    if best is None:
-        return None
-    names = tuple(models)
-    styles = line_styles(names)
-    if len(names) > 1:
-        styles = {names[0]: styles[names[1]], names[1]: styles[names[0]]}
-    return trajectory_figure(best[1], best[2], styles,
-                             best[1].recording[:40].replace('$', r'\$'))
+        for row in table.rows:
+            before, after = (row.values.get(name, math.nan) for name in table.compared)
+            if after > before * (1.0 + LOSS):
+                worse.append(f'{row.name.split(" [")[0]} {change(before, after)}')
+    return () if not worse else (
+        'On data that were not fitted, the model with the finding predicts worse than the '
+        f'recalibrated one: {", ".join(worse)}. Use `plain.yaml` where these count.',)
 
 
-def changes(before: Mapping[str, float], after: Mapping[str, float]) -> list[Change]:
-    """Return a table of errors before and after."""
-    rows = []
-    for key, words in ERRORS:
-        if key in before and key in after:
-            change = 100.0 * (after[key] / before[key] - 1.0) if before[key] > 0.0 else 0.0
-            rows.append(Change(words, f'{before[key]:.4g}', f'{after[key]:.4g}',
-                               f'{change:+.0f} %', change < -5.0))
-    return rows
+def implausible(rows: Sequence[ParameterRow]) -> tuple[str, ...]:
+    """Return a warning where parameters of the recalibration end at what it may use up."""
+    bound = [one.name.replace('_', ' ') for one in rows if one.at_bound]
+    return () if not bound else (
+        f'{len(bound)} of {plural(len(rows), "recalibrated parameter")} '
+        f'{"is at its bound" if len(bound) == 1 else "are at their bounds"} '
+        f'({", ".join(bound)}): the recalibration is not plausible there, and what it could not '
+        'absorb may stand in the finding.',)
 
 
-def six_numbers(case: Case) -> list[dict[str, str]]:
-    """Return the paper's form for each recording: largest |X| and |Y|, before and after."""
-    plain, final = plant_of(case.search.plain), _plant(case.diagnosis.model)
-    whole = case.search.observations
-    rows = []
-    for name in dict.fromkeys(s.recording for s in case.segments):
-        parts = [s for s in case.segments if s.recording == name]
-        before, after = (errors(whole.plant_in(plant, name), parts) for plant in (plain, final))
-        if 'max_abs_x_m' in before and 'max_abs_x_m' in after:
-            rows.append({'name': name, **{
-                f'{axis}_{when}': f'{values[f"max_abs_{axis}_m"]:.3f}'
-                for axis in 'xy' for when, values in (('before', before), ('after', after))}})
-    return rows
-
-
-def new_terms(case: Case) -> list[str]:
+def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple[Advice, ...]:
     """
-    Return what the new elements add to the state equations, as text.
+    Return what to change on the robot and in the simulator.
 
     Parameters
     ----------
-    case : Case
+    diagnosis : Diagnosis
+    shapes : mapping of (str, str) to str
+        Variant of form of each effect of the model, by its id and side.
 
     Returns
     -------
-    list of str
-        One line for each new source's law, and for each state equation it enters.
+    tuple of Advice
     """
-    model = case.diagnosis.model
-    graph, added = new_elements(case.diagnosis.plain_model.structure, model.structure)
-    regime = compile_model(model.structure).regimes[-1]
-    space = compile_model(model.structure).at(model.parameters).sets[-1]
-    names = list(regime.numeric.efforts)
-    lines = []
-    for branch in graph.branches:
-        if branch.name not in added or branch.characteristic is None:
+    robot: list[str] = []
+    simulator: list[str] = []
+    for finding in diagnosis.findings:
+        if finding.effect == 'unknown':
+            robot.append('Look at the part that the report names, at the moments that it lists: '
+                         'no effect of the catalogue acts like this.')
             continue
-        law = branch.characteristic.law
-        if law == 'table':
-            law = f'table of {", ".join(branch.characteristic.of) or "the description"}'
-        for place, variable in reversed(list(enumerate(branch.characteristic.of))):
-            law = law.replace(f'z{place + 1}', variable)
-        law = _ABSENT.sub('', law)
-        lines.append(f'{branch.name} = {law}')
-        column = space.g[:, names.index(branch.name)]
-        large = float(np.max(np.abs(column), initial=0.0))
-        lines.extend(f'    d/dt {state} = … {value:+.4g} · {branch.name}'
-                     for state, value in zip(regime.numeric.states, column[:len(
-                         regime.numeric.states)], strict=True)
-                     if abs(value) > 1e-9 * max(large, 1e-300))
-    return lines
+        values: dict[str, float | str] = {one.name: one.value for one in sizes(finding)}
+        values |= {'side': finding.side, 'where': 'both sides', 'wheels': 'the wheels'}
+        if finding.side in _WHEELS:
+            values |= {'where': f'{finding.side} side', 'wheels': _WHEELS[finding.side]}
+        stream = _STREAMS.get(shapes.get((finding.effect, finding.side), ''))
+        if stream:
+            values['stream'] = stream
+        remedy = effect_kind(finding.effect).advice
+        robot += filled(remedy.robot, values)
+        simulator += filled(remedy.simulator, values)
+    for group in diagnosis.indistinguishable:
+        tell = '; '.join((*group.sensors, *group.manoeuvres))
+        names = ', '.join(name.replace('_', ' ') for name in group.effects)
+        if tell:
+            robot.append(f'Before repairing anything: these recordings cannot tell {names} apart. '
+                         f'What would: {tell}.')
+    simulator.append(
+        'Load the model of this diagnosis, which has all of it: `ros2 run lg_husky_sim sim_node '
+        '--ros-args -p model:=model.yaml`.' if diagnosis.findings else
+        'Load the recalibrated model: `ros2 run lg_husky_sim sim_node --ros-args -p '
+        'model:=model.yaml`.')
+    parts = (('On the robot', robot), ('In the simulator', simulator))
+    return tuple(Advice(where, tuple(lines)) for where, lines in parts if lines)
 
 
-def page(case: Case, located: Located, pictures: Mapping[str, Picture], headline: str) -> str:
+def competing(diagnosis: Diagnosis) -> tuple[Section, ...]:
+    """Return the effects that were refused, beside the one that was taken."""
+    tables, text = [], []
+    for finding in diagnosis.findings:
+        if not finding.rivals:
+            continue
+        top = max(finding.held_out_gain, *(one.held_out_gain for one in finding.rivals), 1e-9)
+        rows: list[tuple[str | Cell, ...]] = [
+            (effect_words(finding), Cell(number(finding.held_out_gain),
+                                         max(finding.held_out_gain, 0.0) / top, Tone.GOOD))]
+        for one in sorted(finding.rivals, key=lambda r: -r.held_out_gain):
+            side = one.side if one.side in ('left', 'right') else ''
+            rows.append((', '.join(part for part in (one.effect.replace('_', ' '), side) if part),
+                         Cell(number(one.held_out_gain), max(one.held_out_gain, 0.0) / top)))
+        tables.append(Table(('effect', 'held-out gain [nats]'), tuple(rows)))
+        near = max(finding.rivals, key=lambda r: r.held_out_gain)
+        share = near.held_out_gain / finding.held_out_gain if finding.held_out_gain > 0.0 else 0.0
+        if share > 0.0:
+            text.append(f'Next to {effect_words(finding)} comes '
+                        f'{near.effect.replace("_", " ")} with {100.0 * share:.0f} % of its gain.')
+    text.append('The held-out gain is the logarithm of how many times more probable data that '
+                'were not fitted are with the effect than without (1 nat: 2.7 times).')
+    return (Section('Competing effects', tuple(text), tables=tuple(tables)),) if tables else ()
+
+
+def found_numbers(diagnosis: Diagnosis) -> tuple[Section, ...]:
+    """Return the numbers of the findings with their intervals and evidence."""
+    rows, points = [], []
+    for finding in diagnosis.findings:
+        rows += [(effect_words(finding), one.name.replace('_', ' '), number(one.value, 4),
+                  f'{number(one.low, 4)} to {number(one.high, 4)}',
+                  '' if one.unit == '1' else one.unit) for one in sizes(finding)]
+        place = f'Elements of the graph: {", ".join(finding.elements)}. ' if (
+            finding.elements) else ''
+        points.append(f'{capitalised(effect_words(finding))} ({finding.subsystem}): shows '
+                      f'{finding.regime or "everywhere"}; acts {onset_words(finding.onset)}. '
+                      f'{place}Held-out gain {number(finding.held_out_gain)} nats'
+                      f'{"; " + finding.chance if finding.chance else ""}.')
+    tables = (Table(('effect', 'parameter', 'estimate', '95 % interval', 'unit'), tuple(rows)),)
+    return (Section('The finding in numbers', points=tuple(points),
+                    tables=tables if rows else ()),) if points else ()
+
+
+def report_data(
+    diagnosis: Diagnosis, recordings: Sequence[str], traces: Sequence[Trace],
+    errors: Sequence[ErrorTable], parameters: Sequence[ParameterRow] = (), *,
+    shapes: Mapping[tuple[str, str], str] | None = None, sections: Sequence[Section] = (),
+    view: View | None = None, provenance: Provenance | None = None,
+) -> ReportData:
     """
-    Return the page; every text in it is escaped.
+    Return all of a diagnosis' report.
 
     Parameters
     ----------
-    case : Case
-    located : Located
-    pictures : mapping of str to Picture
-    headline : str
+    diagnosis : Diagnosis
+    recordings : sequence of str
+    traces : sequence of Trace
+        Of :func:`~lg_husky_sim.reporting.data.diagnosis_trace`.
+    errors : sequence of ErrorTable
+        Columns nominal, recalibrated, with finding; held-out ones first.
+    parameters : sequence of ParameterRow
+        Of the recalibration.
+    shapes : mapping of (str, str) to str, optional
+        Variant of form of each effect of the model, by its id and side.
+    sections : sequence of Section
+        Drawings of the graph, efforts and what else there is.
+    view : View, optional
+        What is shown first; the signal in which the finding helps most if not given.
+    provenance : Provenance, optional
 
     Returns
     -------
-    str
-        HTML that needs no other file.
+    ReportData
     """
-    from jinja2 import Environment, PackageLoader
-    environment = Environment(
-        loader=PackageLoader('lg_husky_sim.diagnosis', '.'), autoescape=True,
-        trim_blocks=True, lstrip_blocks=True)
-    diagnosis, search = case.diagnosis, case.search
-    per_channel = channel_rows(search.observations, search.plain.solution.predicted,
-                               case.fit.solution.predicted)
-    return environment.get_template('report.html.j2').render(
-        title='Diagnosis of ' + ', '.join(dict.fromkeys(s.recording for s in case.segments)),
-        verdict=diagnosis.verdict.value, verdict_words=_WORDS[diagnosis.verdict],
-        headline=headline, confidence=f'{100.0 * diagnosis.confidence:.0f} %',
-        findings=[_finding(f) for f in diagnosis.findings], pictures=pictures,
-        held_out=changes(diagnosis.held_out_plain, diagnosis.held_out_augmented),
-        fitted=changes(diagnosis.plain, diagnosis.augmented),
-        six=six_numbers(case), channels=[
-            {'name': name, 'before': f'{before:.4g}', 'after': f'{after:.4g}',
-             'change': f'{change:+.0f} % ({low:+.0f} to {high:+.0f})', 'better': high < 0.0}
-            for name, before, after, change, low, high in per_channel],
-        groups=_groups(case), mismatch=diagnosis.mismatch[:MOST],
-        left_out=max(0, len(diagnosis.mismatch) - MOST),
-        parts=[(name, f'{100.0 * share:.0f} %') for name, share in located.strengths.items()]
-        if located.certain else [],
-        recalibration=[_number(e, case.nominal.parameters[e.name])
-                       for e in diagnosis.recalibration],
-        changed=labels_of(case)[0] != labels_of(case)[1], terms=new_terms(case),
-        remaining=diagnosis.remaining, notes=diagnosis.notes,
-        recordings=_recordings(case.segments))
-
-
-def _groups(case: Case) -> list[dict[str, Any]]:
-    # What cannot be told apart; for the first group, the drive that would, computed.
-    plain = case.diagnosis.plain_model
-    return [{'effects': one.effects, 'sensors': one.sensors, 'manoeuvres': one.manoeuvres,
-             'drive': named_drive(one.effects, plain.structure, plain.parameters)
-             if place == 0 else ''}
-            for place, one in enumerate(case.diagnosis.indistinguishable)]
-
-
-def _finding(finding: Finding) -> dict[str, Any]:
-    known = finding.effect != 'unknown'
-    return {'finding': finding,
-            'title': effect_kind(finding.effect).title if known else 'an unknown effect',
-            'numbers': [_number(e, None) for e in finding.parameters],
-            'gain': f'{finding.held_out_gain:.0f}',
-            'share': f'{100.0 * min(max(finding.share, 0.0), 1.0):.0f} %',
-            'rivals': [(r.effect, r.side, f'{r.held_out_gain:.0f}') for r in finding.rivals]}
-
-
-def _number(one: Estimate, nominal: float | None) -> dict[str, str]:
-    unit = '' if one.unit == '1' else one.unit
-    return {'name': one.name, 'value': f'{one.value:.4g}', 'unit': unit,
-            'low': f'{one.low:.4g}', 'high': f'{one.high:.4g}',
-            'nominal': '' if nominal is None else f'{nominal:.4g}'}
-
-
-def _recordings(segments: Sequence[Segment]) -> list[tuple[str, str]]:
-    names = dict.fromkeys(s.recording for s in segments)
-    return [(name, f'{sum(s.duration for s in segments if s.recording == name):.0f} s')
-            for name in names]
+    columns = tuple(name for name in (NOMINAL, RECALIBRATED, WITH_FINDING)
+                    if any(name in table.columns for table in errors)
+                    or any(name in trace.predicted for trace in traces))
+    what = ' and '.join(effect_words(one) for one in diagnosis.findings)
+    about = {NOMINAL: 'the model as it was given',
+             RECALIBRATED: 'its parameters refitted within their tolerances, nothing added',
+             WITH_FINDING: f'refitted with {what}'
+             if diagnosis.verdict is Verdict.KNOWN else
+             'refitted with a smooth description of what is missing'}
+    notes = (*diagnosis.notes, *((f'What remains: {diagnosis.remaining}.',)
+                                 if diagnosis.remaining else ()))
+    return ReportData(
+        f'Diagnosis of {", ".join(recordings)}',
+        headline(diagnosis, (*losses(errors), *implausible(parameters))), columns,
+        tuple((name, about[name]) for name in columns), tuple(traces), tuple(errors),
+        advice(diagnosis, shapes or {}), view,
+        tuple(Mismatch(m.recording, _SIGNALS.get(m.channel, m.channel), m.start,
+                       m.end, m.strength, m.subsystem)
+              for m in diagnosis.mismatch),
+        tuple(parameters), (*found_numbers(diagnosis), *competing(diagnosis), *sections), notes,
+        (('model.yaml', 'is the model with the finding' if diagnosis.findings
+          else 'is the recalibrated model'),
+         ('plain.yaml', 'is the recalibrated model without it'),
+         ('diagnosis.json', 'has all numbers')), provenance or Provenance())

@@ -114,6 +114,21 @@ class EffectParameter:
 
 
 @dataclass(frozen=True)
+class Remedy:
+    """
+    What a person should do when an effect is found.
+
+    Parameters
+    ----------
+    robot, simulator : tuple of str
+        Sentences; names of parameters, and side, where, wheels, stream, stand in braces.
+    """
+
+    robot: tuple[str, ...] = ()
+    simulator: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class EffectKind:
     """
     One entry of the catalogue.
@@ -132,6 +147,7 @@ class EffectKind:
         Sides it can act on and forms it can take; the first is the default.
     needs_onset : bool
         Whether it only makes sense with an onset.
+    advice : Remedy
     """
 
     id: str  # noqa: A003
@@ -142,6 +158,7 @@ class EffectKind:
     sides: tuple[str, ...] = ('none',)
     shapes: tuple[str, ...] = ('',)
     needs_onset: bool = False
+    advice: Remedy = Remedy()
 
 
 @dataclass(frozen=True)
@@ -247,7 +264,9 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),
         parameters, tuple(entry.get('sides', ('none',))), tuple(entry.get('shapes', ('',))),
-        entry.get('onset') == 'required')
+        entry.get('onset') == 'required',
+        Remedy(*(tuple(entry.get('advice', {}).get(place, ())) for place in (
+            'robot', 'simulator'))))
 
 
 @cache

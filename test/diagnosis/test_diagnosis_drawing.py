@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from lg_husky_sim.diagnosis.figures import _drawn
+from lg_husky_sim.diagnosis.report_of_case import _short_names
 from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.model import Structure
 import pytest
@@ -17,7 +17,7 @@ def test_new_elements_get_names_of_their_own(name: str) -> None:
     graph = final.network().graph
     before = set(Structure().network().graph.names)
     added = [branch.name for branch in graph.branches if branch.name not in before]
-    drawn, names = _drawn(graph, added)
+    drawn, names = _short_names(graph, added)
     assert len(set(names)) == len(added)
     assert len(drawn.branches) == len(graph.branches)
     if name == 'belt_compliance':

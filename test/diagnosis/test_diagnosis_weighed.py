@@ -17,11 +17,9 @@ from lg_husky_sim.diagnosis.everyday import (
     named_rounds,
     open_rounds,
 )
-from lg_husky_sim.diagnosis.figures import rivals_figure
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
 from lg_husky_sim.diagnosis.held_out import plant_of
 from lg_husky_sim.diagnosis.judge import findings, is_unnamed
-from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
 from lg_husky_sim.diagnosis.weighed import centred, weighed
 from lg_husky_sim.husky.effects import catalogue, Effect
@@ -119,10 +117,6 @@ def test_an_everyday_effect_is_modelled_and_said_but_not_named(
     assert open_rounds(slight) == tuple(r for r in search.rounds if not r.adopted)
     assert name.replace('_', ' ') in everyday_words(slight)
     assert '0.1' in everyday_words(slight)
-    figure = rivals_figure(replace(case, search=slight, diagnosis=replace(
-        case.diagnosis, verdict=Verdict.NOTHING_MISSING)))
-    assert figure is not None
-    assert figure.axes[0].get_title(loc='left') == 'Round 1: too little to be missing'
 
 
 def test_a_smooth_effort_counts_where_it_is_more_than_everyday() -> None:

@@ -1,0 +1,291 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a case: its recordings replayed through three models, graph and efforts drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+import re
+from typing import TYPE_CHECKING
+
+from lg_husky_sim.comparison.replay import replay
+from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
+from lg_husky_sim.diagnosis.diagnose import Case
+from lg_husky_sim.diagnosis.held_out import errors, LONGEST, plant_of, split
+from lg_husky_sim.diagnosis.locate import fingerprints, locate, Located
+from lg_husky_sim.diagnosis.planning import named_drive
+from lg_husky_sim.diagnosis.report import report_data
+from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.husky.model import compile_model, Structure
+from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.linear_graph import Branch, LinearGraph
+from lg_husky_sim.recording import Segment, windows
+from lg_husky_sim.reporting.data import (
+    ErrorRow,
+    ErrorTable,
+    NOMINAL,
+    ParameterRow,
+    Provenance,
+    RECALIBRATED,
+    ReportData,
+    WITH_FINDING,
+)
+from lg_husky_sim.reporting.sections import Cell, Chart, Drawing, Line, Section, Table
+from lg_husky_sim.reporting.words import capitalised, quantity_with_unit
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Factor of a law that is switched off: no Stribeck share.
+_ABSENT = re.compile(r'\(1\+\(0\.0\)\*exp\([^*]*\*\*2\)\)\*')
+#: Branches of the right side's drivetrain, and those of the left one's.
+_OF_SIDE = {'right': re.compile(r'(_[FR]R|RW|MR|BeltR|_S2|\b[RL]_2|TF_[5-8])$'),
+            'left': re.compile(r'(_[FR]L|LW|ML|BeltL|_S1|\b[RL]_1|TF_[1-4])$')}
+#: Term of a law whose factor is zero.
+_ZERO = re.compile(r'[+-]?\(?0\.0\)?\*(sin|cos)\([^()]*\)|\+0\*\(0\.0\)')
+
+
+def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
+    """
+    Return the report of a case.
+
+    Parameters
+    ----------
+    case : Case
+    provenance : Provenance, optional
+
+    Returns
+    -------
+    ReportData
+    """
+    diagnosis, whole = case.diagnosis, case.search.observations
+    plants = {NOMINAL: _plant(case.nominal), RECALIBRATED: plant_of(case.search.plain)}
+    changed = diagnosis.model.structure != diagnosis.plain_model.structure
+    if changed and diagnosis.findings:
+        plants[WITH_FINDING] = _plant(diagnosis.model)
+    columns = tuple(plants)
+    parts: list[Predicted] = [
+        (stretch, {label: replay(whole.plant_in(plant, stretch.recording), stretch)
+                   for label, plant in plants.items()})
+        for stretch in _stretches(case.segments)]
+    pair = (columns[-2], columns[-1])
+    tables = [*_held_out(case, columns),
+              replace(error_table('On all data', parts, columns, compared=pair), note=(
+                  'In brackets its 95 % interval, from resampling blocks of 5 s, so that '
+                  'correlated errors count once.'))]
+    if len({s.recording for s in case.segments}) > 1:
+        tables += [replace(table, title=f'Recording {table.title}', folded=True)
+                   for table in recording_tables(parts, columns, pair)]
+    return report_data(
+        diagnosis, list(dict.fromkeys(s.recording for s in case.segments)),
+        traces_of(parts, columns), tables, _parameters(case),
+        shapes={(e.id, e.side): e.shape for e in diagnosis.model.structure.effects},
+        sections=(*_tried('Where in the model', lambda: _where(case)),
+                  *_tried('A drive that would tell more', lambda: _telling(case))),
+        provenance=provenance)
+
+
+def _tried(heading: str, build: Callable[[], tuple[Section, ...]]) -> tuple[Section, ...]:
+    # A section that cannot be made is a line of the report, and no reason to lose the rest.
+    try:
+        return build()
+    except LgHuskyError as error:
+        return (Section(heading, (f'This cannot be shown: {error}.',)),)
+
+
+def _plant(model: ModelFile) -> Plant:
+    return compile_model(model.structure).at(model.parameters)
+
+
+def _stretches(segments: Sequence[Segment]) -> list[Segment]:
+    # No longer than the errors of a diagnosis are taken over, each from its measured start.
+    found: list[Segment] = []
+    for segment in segments:
+        long = segment.duration > 1.5 * LONGEST
+        found += windows(segment, LONGEST) if long else (segment,)
+    return found
+
+
+def _held_out(case: Case, columns: Sequence[str]) -> list[ErrorTable]:
+    diagnosis = case.diagnosis
+    if not diagnosis.held_out_plain:
+        return []
+    _, test = split(case.segments)
+    known = {NOMINAL: errors(_plant(case.nominal), test), RECALIBRATED: diagnosis.held_out_plain,
+             WITH_FINDING: diagnosis.held_out_augmented}
+    rows = tuple(ErrorRow(quantity_with_unit(key), {
+        name: known[name][key] for name in columns if key in known[name]})
+        for key in diagnosis.held_out_plain)
+    return [ErrorTable(
+        'On data that were not fitted', rows, tuple(columns), True, (columns[-2], columns[-1]),
+        'Root mean square errors, driven by the commands alone; the nominal model is fitted to '
+        'none of the data, the others to the other half.')]
+
+
+def _parameters(case: Case) -> list[ParameterRow]:
+    nominal, bound = case.nominal.parameters, case.search.plain.solution.at_bound
+    rows = []
+    for one in case.diagnosis.recalibration:
+        entry = nominal.entry(one.name)
+        room = abs(entry.value) * entry.tolerance
+        rows.append(ParameterRow(
+            one.name, one.unit, entry.value, one.value, one.low, one.high,
+            max(entry.lower, entry.value - room), min(entry.upper, entry.value + room),
+            one.name in bound))
+    return rows
+
+
+def _where(case: Case) -> tuple[Section, ...]:
+    diagnosis = case.diagnosis
+    located = locate(case.search.observations, case.search.plain)
+    plain, final = diagnosis.plain_model.structure, diagnosis.model.structure
+    elements = [e for f in diagnosis.findings for e in f.elements
+                if f.side not in _OF_SIDE or _OF_SIDE[f.side].search(e)]
+    added = new_elements(plain, final)[1]
+    short = _short_names(*new_elements(plain, final))[1]
+    named = ', '.join(f'{a} is {b}' for a, b in zip(short, added, strict=True))
+    caption = 'The linear graph of the robot' + (
+        '; branches that the finding touches are red' if elements else '') + (
+        f', new ones dashed: {named}.' if added else '.')
+    tables, charts = [], []
+    if located.certain:
+        tables = [Table(('part of the robot', 'relative evidence'), tuple(
+            (name, Cell(f'{100.0 * share:.0f} %', share))
+            for name, share in located.strengths.items()))]
+        charts = _efforts(located)
+    terms = new_terms(diagnosis.model, plain)
+    sections = [Section(
+        'Where in the model', text=('New in the equations:',) if terms else (),
+        verbatim='\n'.join(terms),
+        drawings=(Drawing('graph', caption, lambda: _graph_figure(plain, final, elements)),))]
+    if charts:
+        sections.append(Section(
+            'The missing effort', (
+                'A missing effort as a smoother sees it, without a guess of its law, and what it '
+                'goes with (band: two standard deviations).',), charts=tuple(charts)))
+    if tables:
+        sections.append(Section(
+            'Evidence against each part of the robot', (
+                'How well a smooth missing effort in each part alone would explain what the '
+                'recalibrated model leaves, relative to the best part. Parts that act through the '
+                'same balance are alike in this.',), tables=tuple(tables), folded=True))
+    return tuple(sections)
+
+
+def _efforts(located: Located) -> list[Chart]:
+    explanation, prints = located.explanations[located.best()], fingerprints(located)
+    piece = max(range(len(located.bins)),
+                key=lambda i: float(np.sum(explanation.estimates[i].gains)))
+    estimate = explanation.estimates[piece]
+    name = located.observations.pieces[located.bins[piece].piece].recording
+    charts = []
+    for row, one in enumerate(explanation.inputs):
+        factor = located.responses.factor(
+            located.bins[piece].piece, one.terms[0].factor, estimate.times)
+        spread = 2.0 * np.abs(factor) * estimate.deviations[:, row]
+        stem = f'effort_{row + 1}'
+        charts.append(Chart(stem, f'{capitalised(one.name)} in {name}', (Line(
+            one.name, estimate.times, factor * estimate.values[:, row], spread),),
+            'time [s]', f'[{one.unit}]'))
+        mark = prints[row]
+        if mark.share > 0.0:
+            charts.append(Chart(
+                f'{stem}_law', f'{capitalised(one.name)} against {mark.argument}, which explains '
+                f'{100.0 * mark.share:.0f} % of it', (
+                    Line('moments', mark.at, mark.effort_values, dots=True),
+                    Line('mean', mark.middles, mark.means)), mark.argument, f'[{one.unit}]'))
+    return charts
+
+
+def _telling(case: Case) -> tuple[Section, ...]:
+    # The drive that would tell apart what these recordings cannot, computed.
+    if not case.diagnosis.indistinguishable:
+        return ()
+    plain, first = case.diagnosis.plain_model, case.diagnosis.indistinguishable[0]
+    drive = named_drive(first.effects, plain.structure, plain.parameters)
+    names = ', '.join(f'`{name}`' for name in first.effects)
+    return () if not drive else (Section('A drive that would tell more', (
+        f'These recordings cannot tell {names} apart. By simulation, this drive can: {drive}. '
+        '`lg_husky plan-drive` computes the best one and writes it as a command script.',)),)
+
+
+def new_elements(plain: Structure, final: Structure) -> tuple[LinearGraph, tuple[str, ...]]:
+    """Return the graph with what was found, and the branches that it has more."""
+    graph = final.network().graph
+    before = set(plain.network().graph.names)
+    return graph, tuple(branch.name for branch in graph.branches if branch.name not in before)
+
+
+def new_terms(model: ModelFile, plain: Structure) -> list[str]:
+    """
+    Return what the new elements add to the state equations, as text.
+
+    Parameters
+    ----------
+    model : ModelFile
+        With what was found.
+    plain : Structure
+
+    Returns
+    -------
+    list of str
+        One line for each new source's law, and for each state equation it enters.
+    """
+    graph, added = new_elements(plain, model.structure)
+    regime = compile_model(model.structure).regimes[-1]
+    space = compile_model(model.structure).at(model.parameters).sets[-1]
+    names = list(regime.numeric.efforts)
+    lines = []
+    for branch in graph.branches:
+        if branch.name not in added or branch.characteristic is None:
+            continue
+        law = branch.characteristic.law
+        if law == 'table':
+            law = f'table of {", ".join(branch.characteristic.of) or "the description"}'
+        for place, variable in reversed(list(enumerate(branch.characteristic.of))):
+            law = law.replace(f'z{place + 1}', variable)
+        law = _ZERO.sub('', _ABSENT.sub('', law))
+        lines.append(f'{branch.name} = {law}')
+        column = space.g[:, names.index(branch.name)]
+        large = float(np.max(np.abs(column), initial=0.0))
+        lines.extend(f'    d/dt {state} = … {value:+.4g} · {branch.name}'
+                     for state, value in zip(regime.numeric.states, column[:len(
+                         regime.numeric.states)], strict=True)
+                     if abs(value) > 1e-9 * max(large, 1e-300))
+    return lines
+
+
+def _short_names(graph: LinearGraph, added: Sequence[str]) -> tuple[LinearGraph, tuple[str, ...]]:
+    # New branches under names that are short enough to be drawn: T_new_L, E_new_1.
+    fresh: list[Branch] = []
+    for branch in graph.branches:
+        if branch.name in added:
+            graph = graph.without(branch.name)
+            end = branch.name.rsplit('_', 1)[-1]
+            short = f'{branch.name[0]}_new' + (f'_{end}' if len(end) <= 2 else '')
+            taken = {*graph.names, *(other.name for other in fresh)}
+            if short in taken:
+                short = next(f'{short}_{n}' for n in range(2, len(taken) + 3)
+                             if f'{short}_{n}' not in taken)
+            fresh.append(replace(branch, name=short))
+    return graph.with_branches(*fresh), tuple(branch.name for branch in fresh)
+
+
+def _graph_figure(plain: Structure, final: Structure, elements: Sequence[str]) -> Figure:
+    from lg_husky_sim.linear_graph.drawing import draw_graph
+    from lg_husky_sim.linear_graph.layout import layout
+    from matplotlib.figure import Figure
+
+    graph, added = _short_names(*new_elements(plain, final))
+    blocks = layout(graph)
+    width = max(max(block.x + block.width for block in blocks), 7.0) + 1.0
+    height = -min(block.y for block in blocks) + 2.8
+    figure = Figure(figsize=(width * 0.5, height * 0.5))
+    axes = figure.add_axes((0.01, 0.01, 0.98, 0.98))
+    known = set(graph.names)
+    draw_graph(axes, graph, culprits=[e for e in elements if e in known and e not in added],
+               new=added)
+    return figure

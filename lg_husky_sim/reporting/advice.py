@@ -1,0 +1,43 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Sentences of advice with the numbers that were found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+import string
+
+from lg_husky_sim.reporting.words import number
+
+
+class _Number(float):
+    # A number that is written with three digits where its format says nothing.
+    def __format__(self, spec: str) -> str:
+        return float.__format__(self, spec).replace('-', '−') if spec else number(self)
+
+
+def filled(sentences: Iterable[str], values: Mapping[str, float | str]) -> tuple[str, ...]:
+    """
+    Return sentences with what was found in place of the names in braces.
+
+    Parameters
+    ----------
+    sentences : iterable of str
+        Such as ``Set `max_yaw: {limit_yaw}` in sim_node``.
+    values : mapping of str to float or str
+        Numbers and words by name.
+
+    Returns
+    -------
+    tuple of str
+        Without the sentences that name something that was not found.
+    """
+    known = {name: _Number(value) if isinstance(value, float) else value
+             for name, value in values.items()}
+    return tuple(sentence.format_map(known) for sentence in sentences
+                 if names_in(sentence) <= set(known))
+
+
+def names_in(sentence: str) -> set[str]:
+    """Return the names in braces of a sentence."""
+    return {name for _, name, _, _ in string.Formatter().parse(sentence) if name}

@@ -1,0 +1,200 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a report: HTML that needs no other file; every text in it is escaped."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+import math
+from typing import Any, TYPE_CHECKING
+
+from lg_husky_sim.reporting.data import (
+    ErrorTable,
+    Mismatch,
+    ParameterRow,
+    RECALIBRATED,
+    ReportData,
+    View,
+)
+from lg_husky_sim.reporting.payload import packed_library, payload
+from lg_husky_sim.reporting.sections import Cell, Table, Tone
+from lg_husky_sim.reporting.words import (
+    capitalised,
+    change,
+    number,
+    quantity,
+    quantity_with_unit,
+    SIGN,
+)
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+#: Mismatches in the table of a page; all of them are in the JSON file.
+MOST_MISMATCHES = 15
+
+
+def code(text: str) -> Markup:
+    """Return an escaped text whose parts in backquotes are code."""
+    from markupsafe import escape, Markup
+    parts = str(text).split('`')
+    if len(parts) % 2 == 0:  # a backquote that belongs to a name
+        return escape(text)
+    return Markup('').join(
+        Markup('<code>{}</code>').format(part) if place % 2 else escape(part)
+        for place, part in enumerate(parts))
+
+
+def worded(table: Table) -> list[bool]:
+    """Return which columns of a table hold words and stand to the left."""
+    columns = [[one.text if isinstance(one, Cell) else one for one in column]
+               for column in zip(*table.rows, strict=True)]
+    return [any(text[:1].isalpha() or text[:1] in '`(' for text in column) for column in columns
+            ] or [False] * len(table.head)
+
+
+def error_cells(table: ErrorTable) -> Table:
+    """
+    Return a table of errors as cells: bars for sizes, and the change as gain or loss.
+
+    Parameters
+    ----------
+    table : ErrorTable
+
+    Returns
+    -------
+    Table
+        Without a column to compare with, the smallest error of a row is marked.
+    """
+    head = ['error', *table.columns]
+    if table.compared:
+        head.append('change')
+    rows = []
+    for row in table.rows:
+        known = {name: row.values[name] for name in table.columns
+                 if math.isfinite(row.values.get(name, math.nan))}
+        if not known:
+            continue
+        most, least = max(known.values()), min(known.values())
+        cells: list[str | Cell] = [row.name]
+        for name in table.columns:
+            value = known.get(name, math.nan)
+            best = table.compared is None and len(known) > 1 and value == least
+            cells.append(Cell(number(value), value / most if most > 0.0 and name in known else 0.0,
+                              Tone.GOOD if best else Tone.PLAIN))
+        if table.compared:
+            cells.append(_change_cell(known, table.compared, row.low, row.high))
+        rows.append(cells)
+    return Table(head, rows)
+
+
+def _change_cell(known: Mapping[str, float], compared: tuple[str, str], low: float, high: float
+                 ) -> Cell:
+    before, after = (known.get(name, math.nan) for name in compared)
+    words = change(before, after)
+    if math.isfinite(low) and math.isfinite(high):
+        words += f' ({change(1.0, low)} to {change(1.0, high)})'
+    # A change that is rounded away, or whose interval includes none, is neither.
+    if not (math.isfinite(before) and math.isfinite(after)) or low < 1.0 < high or (
+            round(100.0 * after) == round(100.0 * before)
+            and number(before) == number(after)):
+        return Cell(words)
+    if after > before:
+        return Cell(f'{words} worse', tone=Tone.BAD)
+    return Cell(words, tone=Tone.GOOD if after < before else Tone.PLAIN)
+
+
+def parameter_rows(rows: Sequence[ParameterRow]) -> list[dict[str, Any]]:
+    """Return the table of parameters: numbers as text, and places within what the fit allows."""
+    return [_parameter(one) for one in rows]
+
+
+def _parameter(one: ParameterRow) -> dict[str, Any]:
+    known = math.isfinite(one.low) and math.isfinite(one.high)
+    drawn = math.isfinite(one.least) and math.isfinite(one.most) and one.most > one.least
+    interval = f'{number(one.low, 4)} to {number(one.high, 4)}' if known else '–'
+
+    def at(value: float) -> float:
+        share = 100.0 * (value - one.least) / (one.most - one.least)
+        return min(100.0, max(0.0, share))
+    places = {}
+    if drawn:
+        low, high = (at(one.low), at(one.high)) if known else (at(one.value), at(one.value))
+        places = {'left': f'{low:.1f}', 'width': f'{high - low:.1f}',
+                  'value_at': f'{at(one.value):.1f}', 'nominal_at': f'{at(one.nominal):.1f}',
+                  'words': f'{number(one.value)} within {number(one.least)} to '
+                           f'{number(one.most)}'}
+    moved = 100.0 * (one.value / one.nominal - 1.0) if one.nominal else math.nan
+    return {'name': one.name.replace('_', ' '), 'nominal': number(one.nominal, 4),
+            'value': number(one.value, 4), 'interval': interval,
+            'unit': '' if one.unit == '1' else one.unit, 'at_bound': one.at_bound,
+            'change': f'{moved:+.1f} %'.replace('-', '−') if math.isfinite(moved) else '–',
+            'drawn': drawn, **places}
+
+
+def _mismatches(shown: Sequence[Mismatch], jumps: Mapping[int, int]) -> list[dict[str, Any]]:
+    places = {place: number for number, place in jumps.items()}
+    return [{'recording': one.recording, 'channel': one.channel, 'start': one.start,
+             'end': one.end, 'strength': one.strength, 'part': one.part,
+             'place': places.get(place)} for place, one in enumerate(shown)]
+
+
+def jumps_of(data: ReportData) -> dict[int, int]:
+    """Return which mismatches of the table can be shown: their place by a number of its own."""
+    able = [place for place, one in enumerate(data.mismatches[:MOST_MISMATCHES])
+            if data.trace(one.recording, one.channel) is not None]
+    return dict(enumerate(able))
+
+
+def page(data: ReportData, view: View | None, images: Mapping[str, bytes],
+         captions: Mapping[str, str], notes: Sequence[str] = ()) -> str:
+    """
+    Return the page.
+
+    Parameters
+    ----------
+    data : ReportData
+    view : View or None
+        Of the first picture.
+    images : mapping of str to bytes
+        PNG by name; what the page shows where its live part cannot, and on paper.
+    captions : mapping of str to str
+        By the same names.
+    notes : sequence of str
+        More than those of the data.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    from jinja2 import Environment, PackageLoader
+    from markupsafe import Markup
+    environment = Environment(
+        loader=PackageLoader('lg_husky_sim.reporting', '.'), autoescape=True,
+        trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(code=code, errors=error_cells, quantity=quantity, worded=worded)
+    own = files('lg_husky_sim.reporting')
+    jumps = jumps_of(data)
+    listed = data.mismatches[:MOST_MISMATCHES]
+    live = data.traces or any(section.charts for section in data.sections)
+    library = packed_library() if live else ''
+    heading = '' if view is None else (
+        f'{capitalised(quantity_with_unit(view.channel))}: measured and predicted')
+    return environment.get_template('report.html.j2').render(
+        data=data, view=None if view is None else {'heading': heading}, sign=SIGN,
+        css=Markup((own / 'report.css').read_text('utf-8')),  # noqa: S704, our own file
+        script=Markup((own / 'report.js').read_text('utf-8')),  # noqa: S704, our own file
+        library=Markup(library),  # noqa: S704, base64
+        payload=Markup(payload(data, view, jumps)) if library else '',  # noqa: S704, no <
+        images={name: b64encode(content).decode('ascii') for name, content in images.items()},
+        captions=captions, recordings=data.recordings,
+        responses=[name for name in images if name.endswith('_responses')],
+        paths=[name for name in images if name.endswith('_trajectory')],
+        has_path=any(trace.channel == 'x' for trace in data.traces),
+        mismatches=_mismatches(listed, jumps), has_parts=any(one.part for one in listed),
+        mismatch_of=RECALIBRATED if RECALIBRATED in data.columns else (*data.columns, '')[0],
+        more_mismatches=len(data.mismatches) - len(listed),
+        parameters=parameter_rows(data.parameters), notes=(*data.notes, *notes))

@@ -1,0 +1,94 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One name, one unit and one sign for each quantity, on all pages and in all tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+
+#: What every error is. X is ahead and Y to the left of the robot as it stood at the start.
+SIGN = 'measured − predicted'
+#: Shown where a number is not known.
+UNKNOWN = '–'
+
+QUANTITIES: Mapping[str, tuple[str, str]] = {
+    'wheel_left': ('left wheel rate', 'rad/s'),
+    'wheel_right': ('right wheel rate', 'rad/s'),
+    'wheel_speed': ('wheel rate', 'rad/s'),
+    'forward': ('forward speed', 'm/s'),
+    'advance': ('forward speed (pose)', 'm/s'),
+    'yaw_rate': ('yaw rate', 'rad/s'),
+    'turn': ('yaw rate (pose)', 'rad/s'),
+    'accel_x': ('forward acceleration', 'm/s²'),
+    'heading': ('heading', 'rad'),
+    'position': ('position', 'm'),
+    'x': ('x', 'm'),
+    'y': ('y', 'm'),
+    'position_rmse_m': ('position', 'm'),
+    'heading_rmse': ('heading', 'rad'),
+    'wheel_speed_rmse': ('wheel rate', 'rad/s'),
+    'yaw_rate_rmse': ('yaw rate', 'rad/s'),
+    'forward_rmse': ('forward speed', 'm/s'),
+    'max_abs_x_m': ('largest |X| error', 'm'),
+    'max_abs_y_m': ('largest |Y| error', 'm'),
+}
+"""Name and unit of each quantity, by the key that it has in JSON and in the code."""
+
+
+def quantity(key: str) -> str:
+    """Return the name of a quantity; that of an unknown key is the key in words."""
+    return QUANTITIES[key][0] if key in QUANTITIES else key.replace('_', ' ')
+
+
+def quantity_with_unit(key: str) -> str:
+    """Return the name of a quantity with its unit in brackets."""
+    name, unit = quantity(key), QUANTITIES.get(key, ('', ''))[1]
+    return f'{name} [{unit}]' if unit else name
+
+
+def capitalised(text: str) -> str:
+    """Return a text whose first letter is large, the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
+def plural(count: int, noun: str) -> str:
+    """Return a count with its noun, as in ``1 recording`` and ``2 recordings``."""
+    return f'{count} {noun}{"" if count == 1 else "s"}'
+
+
+def number(value: float, digits: int = 3) -> str:
+    """
+    Return a number in a few significant digits.
+
+    Parameters
+    ----------
+    value : float
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+        With powers of ten for very large and very small numbers; a dash for one that is not
+        finite.
+    """
+    if not math.isfinite(value):
+        return UNKNOWN
+    text = f'{value:.{digits}g}'
+    if 'e' in text and 1e-4 <= abs(value) < 1e7:
+        return f'{value:.0f}'
+    return text.replace('-', '−')
+
+
+def with_unit(value: float, unit: str, digits: int = 3) -> str:
+    """Return a number with its unit; the unit 1 is not written."""
+    return f'{number(value, digits)} {unit}' if unit not in ('', '1') else number(value, digits)
+
+
+def change(before: float, after: float) -> str:
+    """Return a change in per cent with its sign; a dash where there is none."""
+    if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
+        return UNKNOWN
+    share = 100.0 * (after / before - 1.0)
+    return f'×{after / before:.1f}' if share > 999.0 else f'{share:+.0f}\u00a0%'.replace('-', '−')
