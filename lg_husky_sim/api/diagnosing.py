@@ -144,11 +144,14 @@ class DiagnosisResult:
             The report, or diagnosis.json without one.
         """
         from lg_husky_sim.diagnosis.output import MARKER, write_files
+        from lg_husky_sim.reporting.provenance import provenance
+        from lg_husky_sim.reporting.write import REPORT
 
         target = Path(folder)
         with result_folder(target, MARKER) as made:
-            write_files(made, self.case, report)
-        return target / ('report.html' if report else MARKER)
+            write_files(made, self.case, report, provenance(
+                [(one.name, one.path) for one in self.recordings]))
+        return target / (REPORT if (target / REPORT).is_file() else MARKER)
 
     def report(self, folder: PathLike | None = None) -> Path:
         """Write everything into a folder, a temporary one by default; return the page."""

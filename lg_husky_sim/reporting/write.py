@@ -29,6 +29,8 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Name of the page.
+REPORT = 'report.html'
 #: Recordings whose signals a page shows, and recordings whose pictures it prints.
 MOST_RECORDINGS = 24
 MOST_PICTURED = 3
@@ -49,7 +51,7 @@ def check_extras() -> None:
     require('jinja2', 'write a page')
 
 
-def write_report(data: ReportData, folder: Path, name: str = 'report.html', *,
+def write_report(data: ReportData, folder: Path, name: str = REPORT, *,
                  pictured: int = MOST_PICTURED,
                  on_progress: Callable[[], object] | None = None) -> tuple[Path, ...]:
     """
