@@ -92,6 +92,7 @@ setup(
         'click>=8.1',
         'numpy>=1.26',
         'pyyaml>=6.0',
+        'rich>=13',
         'scipy>=1.11',
         'setuptools',
         'sympy>=1.12',

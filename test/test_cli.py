@@ -29,8 +29,9 @@ def lg_husky(*arguments: str, cwd: Path | None = None,
         capture_output=True, timeout=120, check=False, env={**os.environ, **environment})
 
 
-def assert_one_line_error(done: subprocess.CompletedProcess[str], *words: str) -> None:
-    assert done.returncode == 1, done
+def assert_one_line_error(done: subprocess.CompletedProcess[str], *words: str, code: int = 1
+                          ) -> None:
+    assert done.returncode == code, done
     assert done.stderr.startswith('error: '), done.stderr
     assert done.stderr.count('\n') == 1, done.stderr
     assert done.stdout == ''
@@ -83,8 +84,8 @@ def test_a_bug_keeps_its_traceback(verb_from: str) -> None:
         main.run([verb_from, 'bug'])
 
 
-def test_unknown_verb_lists_those_there_are() -> None:
-    assert_one_line_error(lg_husky('identfy'), 'identfy', *PRESENT)
+def test_a_mistyped_verb_gets_a_suggestion_and_lists_those_there_are() -> None:
+    assert_one_line_error(lg_husky('identfy'), 'did you mean identify?', *PRESENT, code=2)
 
 
 def test_without_arguments_the_help_appears() -> None:
@@ -107,7 +108,8 @@ def test_each_verb_explains_itself_and_each_option(verb: str) -> None:
 
 @pytest.mark.parametrize('verb', PRESENT)
 def test_unknown_option_is_one_line(verb: str) -> None:
-    assert_one_line_error(lg_husky(verb, '--no-such-option'), '--no-such-option', f'{verb} -h')
+    assert_one_line_error(lg_husky(verb, '--no-such-option'), '--no-such-option', f'{verb} -h',
+                          code=2)
 
 
 def test_verbs_that_are_not_installed_are_not_listed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 from lg_husky_sim import recording as rec
 from lg_husky_sim.api.progress import Report, Shown, shown
-from lg_husky_sim.api.recordings import PathLike, read_all, Recordings, Topics
+from lg_husky_sim.api.recordings import listed, PathLike, read_all, Recordings, Topics
 from lg_husky_sim.api.robots import as_husky, Husky
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.comparison.metrics import UNITS
@@ -252,15 +252,16 @@ def compare(recordings: Recordings, models: Models = None, *, rivals: Recordings
     """
     if not 0.0 <= horizon < math.inf:
         raise CommandError(f'horizon = {horizon:g} s must be 0 or positive')
+    recordings, rivals = listed(recordings), listed(rivals)
+    if rivals and len(rivals) != len(recordings):
+        raise CommandError(f'{len(rivals)} rivals for {len(recordings)} recordings: give one '
+                           'for each recording, in their order, or none')
     overridden = dict(settings or {})
     plants = _named(models, overridden)
     with shown(progress) as report:
         beside = read_all(rivals, progress=report)
         read, = rec.named_apart(rec.named_as_in(
             read_all(recordings, topics=topics, progress=report), recordings_of(plants)))
-        if beside and len(beside) != len(read):
-            raise CommandError(f'{len(beside)} rivals for {len(read)} recordings: give one '
-                               'for each recording, in their order, or none')
         names = [one.name for one in read]
         outcomes = []
         for place, one in enumerate(read):

@@ -4,14 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import os
 from pathlib import Path
 import tempfile
 from typing import Any, TYPE_CHECKING
+import warnings
 
 from lg_husky_sim.api.progress import Shown, shown
-from lg_husky_sim.api.recordings import PathLike, read_all, Recording, Recordings, Topics
+from lg_husky_sim.api.recordings import listed, PathLike, read_all, Recording, Recordings, Topics
 from lg_husky_sim.api.robots import Husky
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.folders import result_folder
@@ -34,11 +36,14 @@ class DiagnosisResult:
     recordings : tuple of Recording
     before : Husky
         The model in doubt.
+    baseline : tuple of Recording
+        Recordings before a change.
     """
 
     case: Case
     recordings: tuple[Recording, ...]
     before: Husky
+    baseline: tuple[Recording, ...] = ()
 
     @property
     def diagnosis(self) -> Diagnosis:
@@ -127,7 +132,8 @@ class DiagnosisResult:
         """
         return self.compare().plot(axes, recording)
 
-    def save(self, folder: PathLike, report: bool = True) -> Path:
+    def save(self, folder: PathLike, report: bool = True, command: str = '',
+             warn: Callable[[str], object] = warnings.warn) -> Path:
         """
         Write diagnosis.json, model.yaml, plain.yaml, diagnosis.txt, and the report.
 
@@ -137,6 +143,10 @@ class DiagnosisResult:
             Made, or files of an earlier run in it replaced.
         report : bool
             Whether to write report.html and the pictures too.
+        command : str
+            What was typed, for the report.
+        warn : callable
+            Told why there is no report, if one was asked for and cannot be made.
 
         Returns
         -------
@@ -149,9 +159,12 @@ class DiagnosisResult:
 
         target = Path(folder)
         with result_folder(target, MARKER) as made:
-            write_files(made, self.case, report, provenance(
-                [(one.name, one.path) for one in self.recordings]))
-        return target / (REPORT if (target / REPORT).is_file() else MARKER)
+            failure = write_files(made, self.case, report, provenance(
+                [(one.name, one.path) for one in (*self.baseline, *self.recordings)],
+                [('of --robot', self.before.path)] if self.before.path else [], command))
+        if failure:
+            warn(failure)
+        return target / (REPORT if report and not failure else MARKER)
 
     def report(self, folder: PathLike | None = None) -> Path:
         """Write everything into a folder, a temporary one by default; return the page."""
@@ -177,8 +190,9 @@ def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),
     from lg_husky_sim.diagnosis.diagnose import diagnose as run
     from lg_husky_sim.diagnosis.workers import Workers
 
+    recordings, baseline = listed(recordings), listed(baseline)
     with shown(progress) as report, Workers(jobs or 1, scheduler) as workers:
         after = read_all(recordings, topics=topics, progress=lambda stage, _: report(stage, 0.0))
         before = read_all(baseline, topics=topics, progress=lambda stage, _: report(stage, 0.0))
         case = run(after, husky.model, report, before, workers)
-    return DiagnosisResult(case, tuple(after), husky)
+    return DiagnosisResult(case, tuple(after), husky, tuple(before))

@@ -74,18 +74,20 @@ class Lines:
     ----------
     write : callable
         Takes a line.
+    brief : float
+        Stages that end within this time from the beginning get no line [s].
     """
 
-    def __init__(self, write: Callable[[str], object]) -> None:
+    def __init__(self, write: Callable[[str], object], brief: float = 0.0) -> None:
         """Start the clock."""
-        self._write = write
+        self._write, self._brief = write, brief
         self._began = time.monotonic()
         self._last = ''
 
     def __call__(self, stage: str, share: float | None) -> None:
         """Write a line if the stage is another one than before."""
-        if stage == self._last:
+        elapsed = time.monotonic() - self._began
+        if stage == self._last or elapsed < self._brief:
             return
         self._last = stage
-        part = '      ' if share is None else f'{share:5.0%} '
-        self._write(f'{time.monotonic() - self._began:7.1f} s {part} {stage}')
+        self._write(f'{elapsed:7.1f} s {"" if share is None else f"{share:.0%}":>5}  {stage}')

@@ -305,12 +305,8 @@ def read_all(source: Recordings, *, topics: Topics = None, progress: Report | No
     RecordingError
         If one of them is no usable bag.
     """
-    several: Iterable[PathLike | rec.Recording] = [source] if isinstance(
-        source, (str, os.PathLike, rec.Recording)) else source
     chosen = topic_map(topics)
-    given: list[Path | rec.Recording] = []
-    for one in several:
-        given += [one] if isinstance(one, rec.Recording) else bags_in(Path(one))
+    given = listed(source)
     found = []
     for number, one in enumerate(given):
         if isinstance(one, rec.Recording):
@@ -320,3 +316,25 @@ def read_all(source: Recordings, *, topics: Topics = None, progress: Report | No
             progress(f'reading {one.name}', number / len(given))
         found.append(Recording.of(rec.read_recording(one, chosen)))
     return found
+
+
+def listed(source: Recordings) -> list[Path | rec.Recording]:
+    """
+    Return what is to be read, and recordings that are there already; nothing is read.
+
+    Raises
+    ------
+    RecordingError
+        If a path does not exist.
+    """
+    several: Iterable[PathLike | rec.Recording] = [source] if isinstance(
+        source, (str, os.PathLike, rec.Recording)) else source
+    given: list[Path | rec.Recording] = []
+    for one in several:
+        if isinstance(one, rec.Recording):
+            given.append(one)
+            continue
+        if not Path(one).exists():
+            raise RecordingError(f'no recording {one}: there is no such file or folder')
+        given += bags_in(Path(one))
+    return given

@@ -110,15 +110,17 @@ class Survey:
                 'undetermined': list(self.undetermined), 'notes': list(self.notes),
                 'unused_topics': list(self.unused)}
 
-    def __str__(self) -> str:
-        """Return the survey as text."""
+    def heading(self) -> str:
+        """Return the verdict and the lists as text, without the tables."""
         parts = [f'{self.name}: {self.duration:.1f} s. {self.verdict}']
         for heading, items in self.points().items():
             if items:
                 parts += ['', heading, *(f'  {item}' for item in items)]
-        for table in self.tables():
-            parts += ['', str(table)]
         return '\n'.join(parts)
+
+    def __str__(self) -> str:
+        """Return the survey as text."""
+        return '\n\n'.join([self.heading(), *map(str, self.tables())])
 
     def _repr_html_(self) -> str:
         return page_part(f'{self.name}: {self.duration:.1f} s', [self.verdict], self.tables(),

@@ -7,6 +7,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from lg_husky_sim.cli.common import (
+    model_option,
+    Output,
+    RECORDING,
+    settings_option,
+    spoken,
+    topics_option,
+)
 from lg_husky_sim.cli.several import SeveralWords
 
 
@@ -16,34 +24,33 @@ from lg_husky_sim.cli.several import SeveralWords
               help='Folder for index.html, evaluation.json, evaluation.txt and the pictures.')
 @click.option('--case', 'cases', multiple=True, type=click.Choice(['synthetic', 'engine']),
               help="The robot: the paper's graph with other numbers and noisy sensors, or a "
-                   'rigid-body engine (needs MuJoCo). Both by default, unless recordings are '
-                   'given.')
-@click.option('--calibrate', multiple=True, metavar='REC',
+                   'rigid-body engine (needs MuJoCo). By default both, the engine only where '
+                   'MuJoCo is installed; neither if recordings are given.')
+@click.option('--calibrate', multiple=True, metavar='REC', type=RECORDING,
               help='A recording to calibrate on, such as a circle.')
-@click.option('--held-out', multiple=True, metavar='REC [REC …]',
+@click.option('--held-out', multiple=True, metavar='REC [REC …]', type=RECORDING,
               help='A recording to predict; may be given several times.')
-@click.option('--rival', 'rivals', multiple=True, metavar='BAG [BAG …]',
+@click.option('--rival', 'rivals', multiple=True, metavar='BAG [BAG …]', type=RECORDING,
               help="Another simulator's recording of the same drive, one for each recording in "
                    'their order.')
-@click.option('--steps', 'steps', multiple=True, metavar='REC [REC …]',
+@click.option('--steps', 'steps', multiple=True, metavar='REC [REC …]', type=RECORDING,
               help='A recording of commanded steps: fit every other step, predict the rest, '
                    'beside three simple models; may be given several times.')
-@click.option('--model', type=click.Path(path_type=Path), metavar='FILE.yaml',
-              help="Model to start from; the Husky with the paper's parameters by default.")
-@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
-              help='Override physical parameters.')
+@model_option('--model')
+@settings_option
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
               help='Seed of all chance: starts, genes, noise.')
 @click.option('--starts', type=click.IntRange(min=1), default=6, show_default=True,
               help='Starts of the least squares.')
 @click.option('--jobs', type=click.IntRange(min=1), default=1, show_default=True,
               help='Processes to use.')
-@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
-              help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).')
+@topics_option
+@spoken(page=True, data=False)
 def command(
     out: Path, cases: tuple[str, ...], calibrate: tuple[str, ...], held_out: tuple[str, ...],
     rivals: tuple[str, ...], steps: tuple[str, ...], model: Path | None,
     settings: tuple[str, ...], seed: int, starts: int, jobs: int, topics: tuple[str, ...],
+    say: Output,
 ) -> None:
     """
     Redo the paper's evaluation.
@@ -52,25 +59,30 @@ def command(
     tracking errors of each, beside those that the paper prints. Recordings of steps are divided:
     every other step is fitted, the rest is predicted.
     """
+    from importlib.util import find_spec
+
     from lg_husky_sim.errors import CommandError
     from lg_husky_sim.evaluation.session import Request, run_evaluation
     from lg_husky_sim.folders import check_folder
     from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
     from lg_husky_sim.identification.pages import check_extras
     from lg_husky_sim.recording import TopicMap
-    from tqdm import tqdm
 
     check_extras()
     check_folder(out)
     if (held_out or rivals) and not calibrate:
         raise CommandError('--held-out and --rival need --calibrate REC')
-    chosen = cases or (() if calibrate or steps else ('synthetic', 'engine'))
+    chosen = cases
+    if not (cases or calibrate or steps):
+        chosen = ('synthetic', 'engine') if find_spec('mujoco') else ('synthetic',)
+        if len(chosen) == 1:
+            say.remark('without the case engine: it needs MuJoCo, pip install '
+                       "'lg_husky_sim[engine]'")
     start = apply_settings(load_model(model), parse_settings(settings))
     request = Request(chosen, calibrate, held_out, rivals, steps, start, seed, starts, jobs,
                       TopicMap.parse(topics))
-    with tqdm(desc='evaluating', unit='step', disable=None, leave=False) as bar:
-        def tell(word: str) -> None:
-            bar.set_postfix_str(word, refresh=False)
-            bar.update()
-        click.echo(run_evaluation(request, out, tell))
-    click.echo(f'\nwritten: {out / "index.html"}')
+    with say.stages(known=False) as report:
+        text = run_evaluation(request, out, lambda word: report(f'evaluating: {word}', None))
+    say.result(text)
+    say.remark('')
+    say.written(out / 'index.html')

@@ -7,34 +7,43 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from lg_husky_sim.cli.common import (
+    EFFECTS,
+    model_option,
+    NUISANCES,
+    Output,
+    PARAMETERS,
+    RECORDING,
+    settings_option,
+    spoken,
+    topics_option,
+)
 from lg_husky_sim.cli.several import SeveralWords
 
 
 @click.command(cls=SeveralWords,
                short_help='Estimate parameters from recordings; a model file and a report.')
-@click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]')
+@click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]', type=RECORDING)
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='FILE.yaml',
               help='Model file to write; the report stands beside it as .txt, .json and .html. '
                    'With --each a folder that gets these files for every recording.')
-@click.option('--model', type=click.Path(path_type=Path), metavar='FILE.yaml',
-              help="Model to start from; the Husky with the paper's parameters by default.")
-@click.option('--set', 'settings', multiple=True, metavar='NAME=VALUE […]',
-              help='Override physical parameters.')
-@click.option('--free', multiple=True, metavar='NAMES',
+@model_option('--model')
+@settings_option
+@click.option('--free', multiple=True, metavar='NAMES', type=PARAMETERS,
               help='Parameters to estimate, separated by commas; by default those that the model '
                    'marks as free, and the numbers of its effects.')
-@click.option('--effects', multiple=True, metavar='IDS',
+@click.option('--effects', multiple=True, metavar='IDS', type=EFFECTS,
               help='Effects of the catalogue to add, separated by commas: id, id:side or '
                    'id:shape, such as speed_loop,command_latency,command_limit:yaw.')
 @click.option('--method', type=click.Choice(['least-squares', 'ga', 'de']),
               default='least-squares', show_default=True,
               help="Least squares on all outputs; or the paper's genetic algorithm, or "
                    'differential evolution, on the position alone (eq. 23).')
-@click.option('--nuisance', multiple=True, metavar='NAMES',
+@click.option('--nuisance', multiple=True, metavar='NAMES', type=NUISANCES,
               help='Unknowns of the recordings to estimate as well, separated by commas: '
                    'latency, delay_wheels, delay_imu, delay_pose, gyro_bias; and initial_state, '
                    'the state at the start of every segment that begins in motion.')
-@click.option('--profile', multiple=True, metavar='NAMES',
+@click.option('--profile', multiple=True, metavar='NAMES', type=PARAMETERS,
               help='Parameters to give a likelihood profile, separated by commas: intervals '
                    'that hold for bent likelihoods too, at the price of more simulations.')
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
@@ -47,43 +56,52 @@ from lg_husky_sim.cli.several import SeveralWords
               help='Dask scheduler to use in place of processes, such as tcp://10.0.0.1:8786.')
 @click.option('--each', is_flag=True,
               help='Fit every recording on its own in place of all together.')
-@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
-              help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).')
+@topics_option
+@spoken(page=True)
 def command(
     recordings: tuple[str, ...], out: Path, model: Path | None, settings: tuple[str, ...],
     free: tuple[str, ...], effects: tuple[str, ...], method: str, nuisance: tuple[str, ...],
     profile: tuple[str, ...], seed: int, starts: int, jobs: int, scheduler: str | None,
-    each: bool, topics: tuple[str, ...],
+    each: bool, topics: tuple[str, ...], say: Output,
 ) -> None:
     """
     Estimate the parameters of a model from recordings.
 
     The model file can be read by sim_node, simulate and compare. The report says how far the
-    parameters are known, and which of them the recordings cannot tell apart.
+    parameters are known, and which of them the recordings cannot tell apart. A folder stands for
+    all bags in it.
     """
-    from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
-    from lg_husky_sim.identification.options import names_in, with_effects
+    from lg_husky_sim.api.robots import Husky
+    from lg_husky_sim.husky.model_file import parse_settings
+    from lg_husky_sim.identification.options import names_in
     from lg_husky_sim.identification.pages import check_extras
     from lg_husky_sim.identification.report import report_paths
-    from lg_husky_sim.identification.result import Method
-    from lg_husky_sim.identification.session import fit_each, fit_together, Request
     from lg_husky_sim.recording import TopicMap
-    from tqdm import tqdm
 
     check_extras()
     if not each:
         report_paths(out)
-    start = apply_settings(load_model(model), parse_settings(settings))
-    request = Request(
-        with_effects(start, effects), start, Method(method), names_in(free), names_in(nuisance),
-        names_in(profile), seed, starts, TopicMap.parse(topics))
-    with tqdm(desc='fitting', unit='step', disable=None, leave=False) as bar:
-        def tell(word: str) -> None:
-            bar.set_postfix_str(word, refresh=False)
-            bar.update()
+    husky = Husky(model, **parse_settings(settings))
+    choice = TopicMap.parse(topics)
+    with say.stages(known=False) as report:
         if each:
-            click.echo(fit_each(request, recordings, out, jobs, scheduler, tell))
+            from lg_husky_sim.identification.options import with_effects
+            from lg_husky_sim.identification.result import Method
+            from lg_husky_sim.identification.session import fit_each, Request
+            from lg_husky_sim.recording.bags import bags_in
+            request = Request(
+                with_effects(husky.model, effects), husky.model, Method(method), names_in(free),
+                names_in(nuisance), names_in(profile), seed, starts, choice)
+            paths = [str(bag) for path in recordings for bag in bags_in(Path(path))]
+            table, results = fit_each(request, paths, out, jobs, scheduler,
+                                      lambda word: report(f'fitting: {word}', None))
+            say.result(table, [result.data() for result in results])
             return
-        result, paths = fit_together(request, recordings, out, jobs, scheduler, tell)
-    click.echo(result)
-    click.echo('\nwritten: ' + ', '.join(str(path) for path in paths))
+        fit = husky.identify(
+            recordings, names_in(free), effects=effects, method=method,
+            nuisance=names_in(nuisance), profiles=names_in(profile), seed=seed, starts=starts,
+            jobs=jobs, scheduler=scheduler, topics=choice, progress=report)
+        files = fit.save(out)
+    say.result(fit, fit.data())
+    say.remark('\nwritten: ' + ', '.join(str(path) for path in files[:-1]))
+    say.written(files[-1])

@@ -5,20 +5,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module, metadata
+import difflib
+from importlib import import_module
 from importlib.util import find_spec
 import os
 import sys
+import traceback
 from typing import Any
 
 import click
 from lg_husky_sim.errors import LgHuskyError
 
+MISUSED = 2
+"""Exit code after a command line that cannot be understood, as shells expect it."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells expect it (128 + SIGINT)."""
 
 VERBS = {
     'demo': 'lg_husky_sim.cli.demo',
+    'info': 'lg_husky_sim.cli.info',
     'derive': 'lg_husky_sim.cli.derive',
     'simulate': 'lg_husky_sim.cli.simulate',
     'drive': 'lg_husky_sim.cli.drive',
@@ -32,6 +37,9 @@ VERBS = {
     'prove': 'lg_husky_sim.cli.prove',
     'twin': 'lg_husky_sim.cli.twin',
     'import': 'lg_husky_sim.cli.import_',
+    'effects': 'lg_husky_sim.cli.effects',
+    'parameters': 'lg_husky_sim.cli.parameters',
+    'manoeuvres': 'lg_husky_sim.cli.manoeuvres',
 }
 """Verb to the module whose `command` is its click command, in the order of a newcomer's tour."""
 
@@ -60,17 +68,18 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         verb = args[0]
         if not verb.startswith('-') and verb not in self.list_commands(ctx):
-            message = f'{verb} is no verb; there are: {", ".join(self.list_commands(ctx))}'
+            known = self.list_commands(ctx)
+            near = difflib.get_close_matches(verb, known, n=1)
+            hint = f'; did you mean {near[0]}?' if near else ''
+            message = f'{verb} is no verb{hint} (there are: {", ".join(known)})'
             raise click.UsageError(message, ctx)
         return super().resolve_command(ctx, args)
 
 
 def version() -> str:
     """Return the installed version, or that there is none (a source tree without install)."""
-    try:
-        return metadata.version('lg_husky_sim')
-    except metadata.PackageNotFoundError:
-        return 'not installed'
+    import lg_husky_sim
+    return lg_husky_sim.__version__
 
 
 @click.group(
@@ -96,8 +105,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 1 bad input or a file that cannot be read or written (one line on
-        standard error says which), 130 interrupted.
+        Exit code: 0 done, 1 bad input or a file that cannot be read or written, 2 a command that
+        cannot be understood (one line on standard error says what), 130 interrupted.
 
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -108,9 +117,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except click.UsageError as error:
         if isinstance(error, _NO_ARGUMENTS):
             error.show()
-            return 1
+            return MISUSED
         where = error.ctx.command_path if error.ctx else 'lg_husky'
-        return fail(f'error: {error.format_message()} (see {where} -h)')
+        return fail(f'error: {error.format_message()} (see {where} -h)', MISUSED)
     except click.ClickException as error:
         return fail(f'error: {error.format_message()}')
     except BrokenPipeError:
@@ -118,6 +127,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except LgHuskyError as error:
+        if {'-v', '--verbose'} & set(given):
+            traceback.print_exc()
         return fail(f'error: {error}')
     except OSError as error:
         named = error.filename is not None and error.strerror
@@ -127,7 +138,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def fail(message: str, code: int = 1) -> int:
     """Print the message as one line on standard error; return the exit code."""
-    click.echo(' '.join(message.split()), err=True)
+    head, colon, rest = ' '.join(message.split()).partition(':')
+    # click drops the colour where it is no terminal, or NO_COLOR is set.
+    colour = 'red' if colon and 'NO_COLOR' not in os.environ else None
+    click.echo(click.style(head + colon, fg=colour) + rest, err=True)
     return code
 
 

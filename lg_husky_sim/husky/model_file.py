@@ -20,6 +20,8 @@ from lg_husky_sim.resources import config_path
 from lg_husky_sim.yaml_files import read_yaml, shown, yaml_text
 
 SCHEMA = 'lg_husky_sim/model/1'
+PAPER = 'paper'
+"""Name of the packaged model where a file is asked for."""
 _KEYS = {'value', 'unit', 'lower', 'upper', 'tolerance', 'free', 'source', 'low', 'high'}
 
 
@@ -213,7 +215,7 @@ def load_model(path: str | os.PathLike[str] | None = None) -> ModelFile:
     Parameters
     ----------
     path : path-like, optional
-        The packaged Husky if not given.
+        The packaged Husky if not given; so is ``paper``, unless there is a file of that name.
 
     Returns
     -------
@@ -225,6 +227,8 @@ def load_model(path: str | os.PathLike[str] | None = None) -> ModelFile:
         If it cannot be read as a model; the message names file, thing, value and what is allowed.
     """
     place = Path(path) if path is not None else default_model_path()
+    if place == Path(PAPER) and not place.exists():
+        place = default_model_path()
     try:
         data = read_yaml(place, ModelFileError)
     except ModelFileError as error:

@@ -114,7 +114,8 @@ def _fit_one(task: _Task) -> FitResult:
 
 
 def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
-             scheduler: str | None = None, tell: Callable[[str], None] | None = None) -> str:
+             scheduler: str | None = None, tell: Callable[[str], None] | None = None
+             ) -> tuple[str, list[FitResult]]:
     """
     Fit every recording on its own, on processes here or on a cluster.
 
@@ -133,6 +134,7 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
     -------
     str
         A table of the estimates.
+    list of FitResult
 
     Raises
     ------
@@ -149,7 +151,7 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
                         lambda: word('recording'))
     for name, path, result in zip(names, paths, results, strict=True):
         write_fit(result, read_segments(request, [path]), request.before, out / f'{name}.yaml')
-    return each_table(names, results)
+    return each_table(names, results), results
 
 
 def each_table(names: Sequence[str], results: Sequence[FitResult]) -> str:

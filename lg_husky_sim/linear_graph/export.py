@@ -133,14 +133,19 @@ def check_export(path: Path) -> None:
         raise SettingsError(f'cannot export to {path}: a folder is there')
 
 
-def _as_json(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+def json_text(space: StateSpace, name: str, parameters: Mapping[str, float]) -> str:
+    """Return a model as JSON, schema ``lg_husky_sim/state_space/1``."""
     data = {'schema': SCHEMA, 'name': name,
             'equations': 'dx/dt = A x + B u + E du/dt + G f(z), z = H x + K u + N f(z), '
                          'y = C x + D u + F du/dt + L_c f(z)',
             **{key: list(getattr(space, key)) for key in _NAMES},
             **{key: matrix.tolist() for key, matrix in used_matrices(space).items()},
             'parameters': dict(parameters)}
-    return (json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + '\n').encode()
+    return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + '\n'
+
+
+def _as_json(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+    return json_text(space, name, parameters).encode()
 
 
 def _as_mat(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:

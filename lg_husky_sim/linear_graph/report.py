@@ -41,7 +41,7 @@ def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
     graph : LinearGraph, optional
         Given, the elements' values are listed (where the equations write element names).
     numbers : tuple of (NumericModel, mapping), optional
-        Given, the poles are listed.
+        Given, the matrices in numbers and the poles are listed.
     note : str
         A line to write after the matrices.
 
@@ -54,7 +54,8 @@ def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
     ParameterError
         If a number is not allowed.
     """
-    poles = _poles(*numbers) if numbers is not None else ''     # refuses numbers not allowed
+    # Refuses numbers that are not allowed.
+    poles = f'{_numbers(*numbers)}\n\n{_poles(*numbers)}' if numbers is not None else ''
     parts = [title, '=' * len(title), '', steps.text]
     if graph is not None:
         parts += ['', 'Values of the elements', *_values(graph, numbers[1] if numbers else {})]
@@ -110,6 +111,20 @@ def _poles(model: NumericModel, values: Mapping[str, float]) -> str:
     shown = ', '.join(f'{p.real:.6g}' if p.imag == 0.0 else f'{p.real:.6g}{p.imag:+.6g}j'
                       for p in poles)
     return f'Poles with the numbers of the model [1/s]: {shown}'
+
+
+def _numbers(model: NumericModel, values: Mapping[str, float]) -> str:
+    space = model.at(values)
+    parts = ['With the numbers of the model (more digits: --export)']
+    for name in MATRICES:
+        matrix = getattr(space, name)
+        if matrix.size and matrix.any():
+            cells = [[f'{value:.6g}' for value in row] for row in matrix]
+            widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+            parts += [f'{name} =', *('  ' + '  '.join(
+                cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+                for row in cells)]
+    return '\n'.join(parts)
 
 
 def latex_report(title: str, steps: Equations, model: SymbolicStateSpace,

@@ -156,7 +156,8 @@ def check_target(path: Path, *, overwrite: bool = False) -> None:
     if not path.exists() and not path.is_symlink():
         return
     if not overwrite:
-        raise RecordingError(f'{path} exists already; choose another name or remove it')
+        raise RecordingError(f'{path} exists already; choose another name, or allow it to '
+                             'be replaced (--overwrite, overwrite=True)')
     if not (path.is_dir() and (path / 'metadata.yaml').is_file()):
         raise RecordingError(f'{path} exists and is no rosbag2; it is not overwritten')
 

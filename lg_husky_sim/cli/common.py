@@ -1,0 +1,259 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What all verbs share: how much is said, as what, and what can be completed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+import functools
+import json
+from pathlib import Path
+import sys
+from typing import Any, TYPE_CHECKING, TypeVar
+
+import click
+from click.shell_completion import CompletionItem
+
+if TYPE_CHECKING:
+    _TextType = click.ParamType[str]
+else:
+    _TextType = click.ParamType  # generic since click 8.4 only
+
+Function = TypeVar('Function', bound=Callable[..., object])
+#: Stages that end within this time are not worth a line in a log [s].
+BRIEF = 1.0
+
+
+@dataclass(frozen=True)
+class Output:
+    """
+    How a verb speaks.
+
+    Parameters
+    ----------
+    as_json : bool
+        Print the result as JSON, and nothing else, on standard output.
+    quiet : bool
+        No progress and no remarks: only the result.
+    verbose : bool
+        One line a stage with its time, on a terminal too.
+    opened : bool
+        Open the page that was written.
+    """
+
+    as_json: bool = False
+    quiet: bool = False
+    verbose: bool = False
+    opened: bool = False
+
+    @property
+    def progress(self) -> Any:
+        """What the functions of the API take as ``progress``."""
+        from lg_husky_sim.api.progress import Lines
+
+        if self.quiet:
+            return False
+        if sys.stderr.isatty() and not self.verbose:
+            return True
+        return Lines(functools.partial(click.echo, err=True), 0.0 if self.verbose else BRIEF)
+
+    @contextmanager
+    def stages(self, known: bool = True) -> Iterator[Callable[[str, float | None], None]]:
+        """Show progress while the block runs; yields what is told stage and share."""
+        from lg_husky_sim.api.progress import shown
+
+        with shown(self.progress, known) as report:
+            yield report
+
+    def result(self, text: object, data: object = None) -> None:
+        """
+        Print a result.
+
+        Parameters
+        ----------
+        text : object
+            A Table, or what prints itself.
+        data : object, optional
+            The same as plain data; by default the table's.
+        """
+        from lg_husky_sim.api.tables import Table
+
+        if self.as_json:
+            plain = text.data() if data is None and isinstance(text, Table) else data
+            click.echo(json.dumps(plain, indent=1, ensure_ascii=False, allow_nan=False))
+        elif isinstance(text, Table) and sys.stdout.isatty():
+            _console().print(rich_table(text))
+        elif sys.stdout.isatty():
+            from rich.text import Text
+            _console().print(Text(str(text)), soft_wrap=True)
+        else:
+            click.echo(str(text))
+
+    def remark(self, text: str) -> None:
+        """Print what is good to know, unless quiet; beside JSON on standard error."""
+        if not self.quiet:
+            click.echo(text, err=self.as_json)
+
+    def written(self, path: Path, more: str = '') -> None:
+        """Say where the page is, and open it if that was asked for."""
+        self.remark(f'{path}{more}')
+        if self.opened:
+            click.launch(str(path.resolve()))
+
+
+def _console() -> Any:
+    from rich.console import Console
+    return Console(highlight=False)
+
+
+def rich_table(table: Any) -> Any:
+    """Return a table of results as one of rich."""
+    from lg_husky_sim.api.tables import cell, is_number
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    made = Table(title=Text(table.title) if table.title else None, box=SIMPLE_HEAD,
+                 title_justify='left', header_style='bold cyan', pad_edge=False)
+    for place, name in enumerate(table.columns):
+        flush = bool(table.rows) and all(is_number(row[place]) for row in table.rows)
+        made.add_column(name, justify='right' if flush else 'left', no_wrap=flush,
+                        style='bold' if place == 0 else '', overflow='fold')
+    for row in table.rows:
+        made.add_row(*(Text(cell(value)) for value in row))
+    return made
+
+
+def spoken(*, page: bool = False, data: bool = True) -> Callable[[Function], Function]:
+    """
+    Add ``-q``, ``-v``, ``--json`` and ``--open`` to a verb; it gets an `Output` as ``say``.
+
+    Parameters
+    ----------
+    page : bool
+        Whether the verb writes a page that can be opened.
+    data : bool
+        Whether its result can be printed as JSON.
+    """
+    def decorate(function: Function) -> Function:
+        @functools.wraps(function)
+        def wrapped(*args: Any, quiet: bool, verbose: bool, as_json: bool = False,
+                    opened: bool = False, **kwargs: Any) -> object:
+            if quiet and verbose:
+                raise click.UsageError('-q and -v exclude each other')
+            return function(*args, say=Output(as_json, quiet, verbose, opened), **kwargs)
+        options = [
+            click.option('-q', '--quiet', is_flag=True, help='Print the result only.'),
+            click.option('-v', '--verbose', is_flag=True,
+                         help='Print one line for each stage, and where an error comes from.')]
+        if data:
+            options.append(click.option('--json', 'as_json', is_flag=True,
+                                        help='Print the result as JSON.'))
+        if page:
+            options.append(click.option('--open', 'opened', is_flag=True,
+                                        help='Open the page when it is written.'))
+        for option in reversed(options):
+            wrapped = option(wrapped)
+        return wrapped  # type: ignore[return-value]
+    return decorate
+
+
+class Words(_TextType):
+    """
+    A text of which the shell completes the last word of a list.
+
+    Parameters
+    ----------
+    known : callable
+        Returns the words that can be chosen.
+    separator : str
+        Between the words of a list; empty for a single word.
+    ending : str
+        Put behind a completed word, such as ``=``.
+    files : bool
+        Whether it may be a file as well.
+    """
+
+    name = 'text'
+
+    def __init__(self, known: Callable[[], Sequence[str]], separator: str = '',
+                 ending: str = '', files: bool = False) -> None:
+        """Keep what is asked when the shell completes."""
+        self._known, self._separator = known, separator
+        self._ending, self._files = ending, files
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str
+                       ) -> list[CompletionItem]:
+        """Return the words that begin so."""
+        before, between, last = incomplete.rpartition(self._separator) if (
+            self._separator) else ('', '', incomplete)
+        found = [CompletionItem(f'{before}{between}{word}{self._ending}')
+                 for word in self._known() if word.startswith(last)]
+        return [CompletionItem(incomplete, type='file')] if self._files and not found else found
+
+
+def _effects() -> list[str]:
+    from lg_husky_sim.husky.effects import catalogue
+    return list(catalogue())
+
+
+def _parameters() -> list[str]:
+    from lg_husky_sim.husky.effects import catalogue
+    from lg_husky_sim.husky.model_file import load_model
+    return [*load_model().parameters,
+            *(p.name for kind in catalogue().values() for p in kind.parameters)]
+
+
+def _manoeuvres() -> list[str]:
+    from lg_husky_sim.manoeuvres import builtin_manoeuvres
+    return list(builtin_manoeuvres())
+
+
+def _nuisances() -> list[str]:
+    return ['latency', 'delay_wheels', 'delay_imu', 'delay_pose', 'gyro_bias', 'initial_state']
+
+
+def _roles() -> list[str]:
+    from dataclasses import fields
+
+    from lg_husky_sim.recording import TopicMap
+    return [field.name for field in fields(TopicMap)]
+
+
+#: A recording: a file or folder.
+RECORDING = click.Path()
+EFFECT = Words(_effects)
+EFFECTS = Words(_effects, ',')
+PARAMETERS = Words(_parameters, ',')
+NUISANCES = Words(_nuisances, ',')
+SETTING = Words(_parameters, ending='=')
+TOPIC = Words(_roles, ending='=')
+COMMANDS = Words(_manoeuvres, files=True)
+MANOEUVRE = Words(_manoeuvres)
+MODEL = click.Path(path_type=Path)
+
+
+def topics_option(function: Function) -> Function:
+    """Add ``--topic``."""
+    return click.option(
+        '--topic', 'topics', multiple=True, metavar='ROLE=NAME […]', type=TOPIC,
+        help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).',
+    )(function)
+
+
+def settings_option(function: Function) -> Function:
+    """Add ``--set``."""
+    return click.option(
+        '--set', 'settings', multiple=True, metavar='NAME=VALUE […]', type=SETTING,
+        help='Override physical parameters.')(function)
+
+
+def model_option(*flags: str) -> Callable[[Function], Function]:
+    """Add an option for a model file."""
+    def decorate(function: Function) -> Function:
+        return click.option(
+            *flags, type=MODEL, metavar='FILE.yaml',
+            help="Model file; the Husky with the paper's parameters by default.")(function)
+    return decorate

@@ -1,0 +1,19 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`lg_husky parameters`: the physical parameters of a model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from lg_husky_sim.cli.common import MODEL, Output, spoken
+
+
+@click.command(short_help="List a model's parameters: value, unit, bounds, source.")
+@click.argument('model', required=False, metavar='[FILE.yaml]', type=MODEL)
+@spoken()
+def command(model: Path | None, say: Output) -> None:
+    """List the parameters of a model file, of the packaged Husky by default."""
+    from lg_husky_sim.api.robots import Husky
+    say.result(Husky(model).table())

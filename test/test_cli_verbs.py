@@ -1,0 +1,177 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How verbs speak: JSON, quiet, one line a stage, completion, and what they list."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+import subprocess
+import sys
+from typing import Any
+
+import click
+from click.shell_completion import ShellComplete
+from click.testing import CliRunner
+import lg_husky_sim as lg
+from lg_husky_sim.cli import main
+from lg_husky_sim.cli.common import BRIEF, Output, rich_table
+from lg_husky_sim.husky.effects import catalogue
+from lg_husky_sim.manoeuvres import builtin_manoeuvres
+import pytest
+
+
+def run(*arguments: str) -> Any:
+    """Run a verb in this process; standard output and error apart."""
+    return CliRunner().invoke(main.cli, list(arguments), catch_exceptions=False)
+
+
+@pytest.fixture(scope='module')
+def drive(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(lg.Husky().simulate('s_bend').save(tmp_path_factory.mktemp('bags') / 'drive'))
+
+
+def completions(words: list[str], incomplete: str) -> tuple[list[str], set[str]]:
+    """Return what the shell would offer, and the kinds of it (plain, file)."""
+    complete = ShellComplete(main.cli, {}, 'lg_husky', '_LG_HUSKY_COMPLETE')
+    found = complete.get_completions(words, incomplete)
+    return [item.value for item in found], {item.type for item in found}
+
+
+@pytest.mark.parametrize('verb', ['compare', 'identify', 'diagnose', 'info'])
+def test_recordings_are_completed_as_files(verb: str) -> None:
+    assert completions([verb], '') == ([''], {'file'})
+    assert completions([verb, 'one'], 'tw') == (['tw'], {'file'})
+
+
+def test_effects_parameters_and_manoeuvres_are_completed() -> None:
+    assert set(completions(['effects'], '')[0]) == set(catalogue())
+    assert completions(['identify', '--effects'], 'torque_ripple,gyro_b')[0] == [
+        'torque_ripple,gyro_bias']
+    assert 'wheel_radius=' in completions(['simulate', '--set'], 'wheel_r')[0]
+    assert completions(['identify', '--free'], 'mass,track')[0] == ['mass,track']
+    assert set(completions(['simulate', '--commands'], '')[0]) == set(builtin_manoeuvres())
+    assert completions(['simulate', '--commands'], 'bags/') == (['bags/'], {'file'})
+    assert completions(['derive', '--model'], 'exp')[0] == ['expanded']
+
+
+def test_the_catalogue_is_listed_without_making_a_mistake() -> None:
+    said = run('effects').output
+    assert all(name in said for name in catalogue())
+    one = json.loads(run('effects', 'coulomb_drivetrain', '--json').output)
+    assert {row['parameter'] for row in one} == {'dry_torque', 'dry_speed'}
+
+
+def test_manoeuvres_and_parameters_are_listed(tmp_path: Path) -> None:
+    assert {row['manoeuvre'] for row in json.loads(run('manoeuvres', '--json').output)} == set(
+        builtin_manoeuvres())
+    path = lg.Husky(mass=60.0).save(tmp_path / 'heavy.yaml')
+    rows = json.loads(run('parameters', str(path), '--json').output)
+    assert next(row['value'] for row in rows if row['parameter'] == 'mass') == 60.0
+
+
+def test_info_says_what_a_bag_is_good_for(drive: str) -> None:
+    said = run('info', drive)
+    assert said.exit_code == 0
+    assert 'Enough for diagnose.' in said.output
+    (data,) = json.loads(run('info', drive, '--json').stdout)
+    assert data['enough_for_diagnose'] is True
+    assert {row['stream'] for row in data['streams']} >= {'command', 'wheels', 'imu', 'pose'}
+
+
+def test_info_takes_a_folder_of_bags(drive: str, tmp_path: Path) -> None:
+    for name in ('a', 'b'):
+        lg.read(drive).save(tmp_path / name)
+    names = [one['name'] for one in json.loads(run('info', str(tmp_path), '--json').stdout)]
+    assert names == ['a', 'b']
+
+
+def test_compare_prints_the_json_that_it_writes(drive: str, tmp_path: Path) -> None:
+    done = run('compare', drive, '--model', 'paper', '--out', str(tmp_path / 'out'), '--figures',
+               '0', '--json', '-q', '--bag', str(tmp_path / 'signals'), '--trajectories',
+               str(tmp_path / 'tum'))
+    assert json.loads(done.stdout) == json.loads(
+        (tmp_path / 'out' / 'compare.json').read_text('utf-8'))
+    assert done.stderr == ''
+    assert {path.name for path in tmp_path.iterdir()} == {
+        'out', 'signals', 'signals.foxglove.json', 'signals.plotjuggler.xml', 'tum'}
+
+
+def test_a_page_is_opened_only_when_asked_for(
+        drive: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(click, 'launch', opened.append)
+    arguments = ['compare', drive, '--out', str(tmp_path / 'out'), '--figures', '0']
+    run(*arguments)
+    assert opened == []
+    run(*arguments, '--open')
+    assert opened == [str(tmp_path / 'out' / 'index.html')]
+
+
+def test_quiet_and_verbose_exclude_each_other() -> None:
+    with pytest.raises(click.UsageError, match='exclude each other'):
+        CliRunner().invoke(main.cli, ['manoeuvres', '-q', '-v'], standalone_mode=False,
+                           catch_exceptions=False)
+
+
+def test_verbose_tells_stages_and_where_an_error_comes_from(drive: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, '-m', 'lg_husky_sim.cli.main', 'info', '-v', drive,
+         str(tmp_path / 'none')], text=True, capture_output=True, timeout=120, check=False)
+    lines = done.stderr.splitlines()
+    assert done.returncode == 1
+    assert lines[0].endswith('reading drive')
+    assert 'Traceback (most recent call last):' in done.stderr
+    assert lines[-1].startswith('error: no recording')
+
+
+def test_without_a_terminal_long_work_tells_each_stage_and_short_work_nothing(
+        capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr('lg_husky_sim.api.progress.time.monotonic', lambda: now[0])
+    with Output().stages() as report:
+        report('reading', 0.0)
+        assert capsys.readouterr().err == ''
+        for stage, now[0] in (('fitting', 2.0 * BRIEF), ('fitting', 5.0), ('drawing', 61.5)):
+            report(stage, 0.5)
+    assert [line.split() for line in capsys.readouterr().err.splitlines()] == [
+        ['2.0', 's', '50%', 'fitting'], ['61.5', 's', '50%', 'drawing']]
+    with Output(quiet=True).stages() as report:
+        now[0] = 100.0
+        report('silent', 1.0)
+    assert capsys.readouterr().err == ''
+
+
+def test_tables_of_the_terminal_hold_the_same_cells() -> None:
+    from rich.console import Console
+    console = Console(width=200, file=io.StringIO(), record=True)
+    table = lg.list_manoeuvres()
+    console.print(rich_table(table))
+    drawn = console.export_text()
+    assert all(str(row[0]) in drawn and str(row[4]) in drawn for row in table.rows)
+
+
+def test_a_bag_is_replaced_only_with_overwrite_and_the_message_says_so(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ['simulate', '--commands', 'straight', '--out', str(tmp_path / 'bag')]
+    assert main.run(arguments) == 0
+    assert main.run(arguments) == 1
+    assert '--overwrite' in capsys.readouterr().err
+    assert main.run([*arguments, '--overwrite']) == 0
+
+
+def test_paper_names_the_packaged_model_unless_a_file_is_called_so(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert lg.Husky('paper').model == lg.Husky().model
+    monkeypatch.chdir(tmp_path)
+    lg.Husky(mass=60.0).save('paper')
+    assert lg.Husky('paper').parameters['mass'] == 60.0
+
+
+def test_derive_prints_numbers_and_exports_them(tmp_path: Path) -> None:
+    path = tmp_path / 'husky.json'
+    said = run('derive', '--export', str(path))
+    assert 'With the numbers of the model' in said.stdout
+    assert '-2090.91' in said.stdout
+    assert json.loads(path.read_text('utf-8')) == json.loads(run('derive', '--json').stdout)
