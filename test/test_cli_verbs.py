@@ -116,14 +116,15 @@ def test_quiet_and_verbose_exclude_each_other() -> None:
 
 
 def test_verbose_tells_stages_and_where_an_error_comes_from(drive: str, tmp_path: Path) -> None:
+    (tmp_path / 'torn.mcap').write_bytes(b'no bag')
     done = subprocess.run(
         [sys.executable, '-m', 'lg_husky_sim.cli.main', 'info', '-v', drive,
-         str(tmp_path / 'none')], text=True, capture_output=True, timeout=120, check=False)
+         str(tmp_path / 'torn.mcap')], text=True, capture_output=True, timeout=120, check=False)
     lines = done.stderr.splitlines()
     assert done.returncode == 1
     assert lines[0].endswith('reading drive')
     assert 'Traceback (most recent call last):' in done.stderr
-    assert lines[-1].startswith('error: no recording')
+    assert lines[-1].startswith('error: cannot read')
 
 
 def test_without_a_terminal_long_work_tells_each_stage_and_short_work_nothing(
