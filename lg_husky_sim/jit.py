@@ -43,6 +43,15 @@ def jit_part(function: Function) -> Function:
     return _compiled(function, {'_nrt': False, 'forceinline': True})
 
 
+def jit_call(function: Function) -> Function:
+    """
+    Compile a function that compiled ones call from several places, as :func:`jit_part` does.
+
+    Its code stays by itself, which compiles faster and runs nearly as fast.
+    """
+    return _compiled(function, {'_nrt': False})
+
+
 def _compiled(function: Function, options: dict[str, bool]) -> Function:
     if not compiled():
         return function

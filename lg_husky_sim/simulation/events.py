@@ -1,0 +1,172 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Drive a plant with commands at any stamps and read it off at any times, without a grid.
+
+``trajectory`` is the whole in one call. Where many parameter values meet the same commands and
+times, prepare those once::
+
+    events = Events(commands, times, start=0.0)
+    for plant in plants:
+        drive = Propagator(plant)
+        columns = drive.run(events, drive.initial())
+"""
+
+from __future__ import annotations
+
+import math
+
+from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
+from lg_husky_sim.simulation.event_kernel import COLUMNS
+from lg_husky_sim.simulation.event_kernel import run as run_kernel
+from lg_husky_sim.simulation.initial_state import InitialStates
+from lg_husky_sim.simulation.modes import packed
+import numpy as np
+from numpy.typing import ArrayLike
+
+__all__ = ['COLUMNS', 'Events', 'Propagator', 'run', 'trajectory']
+
+
+class Events:
+    """
+    Commands and the times at which a drive is wanted, checked and sorted once.
+
+    Parameters
+    ----------
+    commands : TimeSeries
+        Names forward [m/s], yaw [rad/s]; each holds from its own stamp until the next. Those
+        before ``start`` count with their own stamps: a dead time may still hold them back.
+    times : array_like, shape (n_times,)
+        Where output is wanted [s], in any order, not before ``start``.
+    start : float, optional
+        Where the simulation begins [s]; the first command's stamp if not given.
+    fresh : bool
+        Whether a command from before ``start`` counts as given at the start.
+
+    Raises
+    ------
+    ParameterError
+        If a time is not finite or lies before the start, or nothing says where to start.
+    """
+
+    def __init__(self, commands: TimeSeries, times: ArrayLike, *, start: float | None = None,
+                 fresh: bool = False) -> None:
+        if start is None:
+            if len(commands) == 0:
+                raise ParameterError('start is not given, and there is no command to start at')
+            start = float(commands.times[0])
+        wanted = np.asarray(times, dtype=np.float64).ravel()
+        if not math.isfinite(start) or not np.all(np.isfinite(wanted)):
+            raise ParameterError(f'start = {start} s and the {wanted.size} times must be finite')
+        if wanted.size and wanted.min() < start:
+            raise ParameterError(f'time = {wanted.min():g} s lies before start = {start:g} s')
+        self.start = start
+        ordered = bool(np.all(wanted[1:] >= wanted[:-1]))
+        self.order = None if ordered else np.argsort(wanted, kind='stable')
+        #: Sorted times [s].
+        self.times = wanted if self.order is None else wanted[self.order]
+        self.end = float(self.times[-1]) if wanted.size else start
+        stamps = np.array(commands.times)
+        values = np.column_stack([commands.column('forward'), commands.column('yaw')])
+        if fresh:
+            first = max(int(np.searchsorted(stamps, start, side='right')) - 1, 0)
+            stamps, values = np.maximum(stamps[first:], start), values[first:]
+        self.stamps = stamps
+        self.values = np.ascontiguousarray(values)
+
+
+class Propagator:
+    """
+    A plant in the coordinates of its modes, ready to be driven.
+
+    Parameters
+    ----------
+    plant : Plant
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self.plant = plant
+        self._packed = packed(plant)
+        self._starts = InitialStates(plant)
+
+    def initial(self, pose: Pose | None = None, twist: BodyTwist | None = None,
+                time: float = 0.0, wheel_rates: tuple[float, float] | None = None,
+                wheel_angles: tuple[float, float] = (0.0, 0.0),
+                command: BodyTwist | None = None) -> FloatArray:
+        """Return a flat state to start from, as :meth:`InitialStates.flat` says."""
+        return self._starts.flat(pose, twist, time, wheel_rates, wheel_angles, command)
+
+    def run(self, events: Events, initial: FloatArray, *, fine_pose: bool = True) -> FloatArray:
+        """
+        Drive the plant from a state through all events.
+
+        Parameters
+        ----------
+        events : Events
+        initial : numpy.ndarray, shape (n + TAIL,)
+            Flat state, of :meth:`initial`; its time is replaced by the events' start.
+        fine_pose : bool
+            Whether x and y are wanted to better than 1e-7 m; else they are chords between the
+            times, which is a little faster.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n_times, 15)
+            :data:`COLUMNS` at the events' times, in the order in which they were given.
+        """
+        flat = np.array(initial)
+        flat[len(self.plant.states) + 6] = events.start
+        out = np.empty((events.times.size, len(COLUMNS)))
+        run_kernel(flat, events.stamps, events.values, events.times, out, events.end,
+                   fine_pose, self._packed)
+        if events.order is None:
+            return out
+        given = np.empty_like(out)
+        given[events.order] = out
+        return given
+
+
+def run(plant: Plant, events: Events, initial: FloatArray) -> FloatArray:
+    """Drive a plant through events from a flat state, as :meth:`Propagator.run`."""
+    return Propagator(plant).run(events, initial)
+
+
+def trajectory(plant: Plant, commands: TimeSeries, times: ArrayLike, *,
+               start: float | None = None, pose: Pose | None = None,
+               twist: BodyTwist | None = None, wheel_rates: tuple[float, float] | None = None,
+               wheel_angles: tuple[float, float] = (0.0, 0.0),
+               command: BodyTwist | None = None) -> TimeSeries:
+    """
+    Drive a plant with commands and return where it is at the given times.
+
+    Parameters
+    ----------
+    plant : Plant
+    commands : TimeSeries
+        Names forward [m/s], yaw [rad/s]; each holds from its own stamp until the next.
+    times : array_like, shape (n_times,)
+        Sorted, not before ``start`` [s].
+    start : float, optional
+        Where the simulation begins [s]; the first command's stamp if not given.
+    pose, twist, wheel_rates, wheel_angles
+        Where it starts, as in :meth:`InitialStates.flat`.
+    command : BodyTwist, optional
+        What was in force before the first command; nothing if not given.
+
+    Returns
+    -------
+    TimeSeries
+        :data:`COLUMNS` at ``times``: the truth, before the sensors. Where something jumps, what
+        was before the jump.
+
+    Raises
+    ------
+    ParameterError
+        If a time is not finite or lies before the start.
+    """
+    events = Events(commands, times, start=start)
+    drive = Propagator(plant)
+    state = drive.initial(pose, twist, events.start, wheel_rates, wheel_angles, command)
+    return TimeSeries(np.asarray(times, dtype=np.float64), drive.run(events, state), COLUMNS)

@@ -1,0 +1,95 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The state from which a simulation starts, from what is known of pose, motion and commands."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.signals import BodyTwist, FloatArray, Pose
+from lg_husky_sim.simulation.event_kernel import TAIL
+import numpy as np
+
+
+class InitialStates:
+    """
+    States of a plant to start from.
+
+    Parameters
+    ----------
+    plant : Plant
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self._set = plant.sets[0]
+
+    @cached_property
+    def steady(self) -> FloatArray:
+        """States per volt of steady driving, shape (n, 2)."""
+        return np.asarray(np.linalg.lstsq(-self._set.a, self._set.b, rcond=None)[0],
+                          dtype=np.float64)
+
+    def flat(self, pose: Pose | None = None, twist: BodyTwist | None = None, time: float = 0.0,
+             wheel_rates: tuple[float, float] | None = None,
+             wheel_angles: tuple[float, float] = (0.0, 0.0),
+             command: BodyTwist | None = None) -> FloatArray:
+        """
+        Return a flat state of :mod:`lg_husky_sim.simulation.event_kernel`.
+
+        Parameters
+        ----------
+        pose : Pose, optional
+        twist : BodyTwist, optional
+            Velocity of the base; at rest if not given.
+        time : float
+            Simulated time [s].
+        wheel_rates : tuple of float, optional
+            Left and right [rad/s]; those that roll without slip at ``twist`` if not given.
+        wheel_angles : tuple of float
+            Left and right [rad].
+        command : BodyTwist, optional
+            What has been commanded for long until then; nothing if not given.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n + TAIL,)
+            Other states (currents, controllers) are those of the nearest steady drive.
+        """
+        pose, twist = pose or Pose(), twist or BodyTwist()
+        one = self._set
+        n = one.a.shape[0]
+        flat = np.zeros(n + TAIL)
+        if wheel_rates is None and (twist.forward or twist.yaw):
+            wheel_rates = self.rates_without_slip(twist)
+        wanted = np.array([*(wheel_rates or (0.0, 0.0)), twist.forward, twist.yaw])
+        if np.any(wanted):
+            # The nearest steady drive, so that controllers and belts start where they would be,
+            # and the least change that makes it agree with what is wanted.
+            nearest = self.steady @ np.linalg.lstsq(one.rows[:4] @ self.steady, wanted,
+                                                    rcond=None)[0]
+            flat[:n] = nearest + np.linalg.lstsq(
+                one.rows[:4], wanted - one.rows[:4] @ nearest, rcond=None)[0]
+        flat[n:n + 2] = wheel_angles
+        flat[n + 3:n + 7] = pose.heading, pose.x, pose.y, time
+        if command is not None:
+            limit = one.command
+            flat[n + 11] = max(-limit.limit_forward, min(limit.limit_forward, command.forward))
+            flat[n + 12] = max(-limit.limit_yaw, min(limit.limit_yaw, command.yaw))
+            flat[n + 13:] = command.forward, command.yaw
+        return flat
+
+    def rates_without_slip(self, twist: BodyTwist) -> tuple[float, float]:
+        """Return the wheel rates [rad/s] at which the wheels' dampers carry no torque."""
+        one = self._set
+        rates = np.array([twist.forward * one.command.volts_per_speed
+                          + sign * twist.yaw * one.command.volts_per_rate
+                          for sign in (-1.0, 1.0)])
+        gains = one.rows[:4] @ self.steady
+        body = gains[2:] @ rates
+        share = [twist.forward / body[0] if body[0] else 1.0,
+                 twist.yaw / body[1] if body[1] else 1.0]
+        mean, half = 0.5 * (rates[0] + rates[1]), 0.5 * (rates[1] - rates[0])
+        left, right = gains[:2] @ np.array([share[0] * mean - share[1] * half,
+                                            share[0] * mean + share[1] * half])
+        return float(left), float(right)

@@ -1,0 +1,171 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A plant in the coordinates of its modes, in which any interval is exact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+from lg_husky_sim.husky.effects import OnsetKind
+from lg_husky_sim.husky.laws import Law, WIDTH
+from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet
+from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.simulation.merging import merged
+from lg_husky_sim.simulation.modal_kernel import Packed
+import numpy as np
+from numpy.typing import NDArray
+
+#: Condition of the eigenvectors beyond which A is perturbed.
+WORST_CONDITION = 1e7
+#: Relative size of that perturbation: the matrices' own numbers are known far worse.
+PERTURBATION = 1e-10
+#: Rows of the outputs in the kernel: those of the plant, and the yaw acceleration [rad/s²].
+ROWS = 10
+_LANES = 4
+_ONSETS = {OnsetKind.TIME: 1.0, OnsetKind.PLACE_ABOVE: 2.0, OnsetKind.PLACE_BELOW: 3.0}
+_CONTEXTUAL = (Law.HEADING, Law.WHEEL_PHASE, Law.TABLE)
+_REMEMBERING = (Law.HEATING, Law.BACKLASH)
+_Numbers = TypeVar('_Numbers', NDArray[np.float64], NDArray[np.int64])
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """
+    The modes of one matrix A (n x n): real ones first, then pairs.
+
+    Parameters
+    ----------
+    n_real, n_pairs : int
+    rates : numpy.ndarray, shape (n_real + 2 n_pairs,)
+        Real eigenvalues, real parts of the pairs, imaginary parts of the pairs [1/s].
+    out_of : numpy.ndarray, shape (n, n_real + 2 n_pairs)
+        x = out_of @ xi, xi = real modes, real and imaginary parts of the pairs.
+    into : numpy.ndarray, shape (n_real + 2 n_pairs, n)
+        xi = into @ x.
+    """
+
+    n_real: int
+    n_pairs: int
+    rates: FloatArray
+    out_of: FloatArray
+    into: FloatArray
+
+
+def modes_of(a: FloatArray) -> Modes:
+    """
+    Return the modes of a matrix.
+
+    Parameters
+    ----------
+    a : numpy.ndarray, shape (n, n)
+
+    Returns
+    -------
+    Modes
+        Of a matrix nearby (:data:`PERTURBATION`) where equal eigenvalues share an eigenvector.
+    """
+    values, vectors = np.linalg.eig(a)
+    inverse = _inverse(vectors)
+    if inverse is None:
+        # Fixed numbers: the same plant gives the same bits.
+        size = np.abs(a) + 1e-3 * np.max(np.abs(a), initial=1.0)
+        shake = np.random.default_rng(0).uniform(-1.0, 1.0, a.shape)
+        values, vectors = np.linalg.eig(a + PERTURBATION * size * shake)
+        inverse = np.linalg.inv(vectors)
+    real = np.flatnonzero(values.imag == 0.0)
+    pairs = np.flatnonzero(values.imag > 0.0)
+    whole = values.astype(np.complex128)
+    rates = np.concatenate([whole[real].real, whole[pairs].real, whole[pairs].imag])
+    out_of = np.concatenate([vectors[:, real].real, 2.0 * vectors[:, pairs].real,
+                             -2.0 * vectors[:, pairs].imag], axis=1)
+    into = np.concatenate([inverse[real].real, inverse[pairs].real, inverse[pairs].imag])
+    return Modes(real.size, pairs.size, rates, out_of, into)
+
+
+def _inverse(vectors: NDArray[np.complex128]) -> NDArray[np.complex128] | None:
+    try:
+        inverse = np.linalg.inv(vectors).astype(np.complex128)
+    except np.linalg.LinAlgError:
+        return None
+    size = np.abs(vectors).sum(axis=0).max() * np.abs(inverse).sum(axis=0).max()
+    return inverse if size < WORST_CONDITION else None
+
+
+def _stage(command: CommandStage) -> list[float]:
+    return [command.latency, command.slew_forward, command.slew_yaw, command.limit_forward,
+            command.limit_yaw, command.volts_per_speed, command.volts_per_rate, command.clamp]
+
+
+def _padded(array: _Numbers, shape: tuple[int, ...], value: int = 0) -> _Numbers:
+    if array.shape == shape:
+        return np.ascontiguousarray(array)
+    whole: _Numbers = np.full(shape, value, dtype=array.dtype)
+    whole[tuple(slice(have) for have in array.shape)] = array
+    return whole
+
+
+def _rows(one: PlantSet) -> tuple[FloatArray, FloatArray, FloatArray]:
+    # Outputs with the yaw acceleration as a further row, transposed.
+    yaw = one.rows[3]
+    rows = np.vstack([one.rows, yaw @ one.a])
+    rows_u = np.vstack([one.rows_u, yaw @ one.b])
+    rows_f = np.vstack([one.rows_f, yaw @ one.g])
+    return rows.T, rows_u.T, rows_f.T
+
+
+def packed(plant: Plant) -> Packed:
+    """
+    Return what the kernel needs of a plant.
+
+    Parameters
+    ----------
+    plant : Plant
+
+    Returns
+    -------
+    Packed
+    """
+    sets = tuple(merged(one) for one in plant.sets)
+    n = sets[0].a.shape[0]
+    modes = [modes_of(one.a) for one in sets]
+    # Whole vectors of the processor: dummies at rest fill the last one.
+    size = -(-max(mode.rates.size for mode in modes) // _LANES) * _LANES
+    efforts = max(one.laws.size for one in sets)
+    arguments = max(one.h.shape[0] for one in sets)
+    wide = -(-ROWS // _LANES) * _LANES
+    stacks: list[list[NDArray[np.generic]]] = [[] for _ in range(17)]
+    for one, mode in zip(sets, modes, strict=True):
+        rows, rows_u, rows_f = _rows(one)
+        needs = (bool(np.any(np.isin(one.laws, _CONTEXTUAL))),
+                 bool(np.any(np.isin(one.laws, _REMEMBERING))), bool(np.any(one.k)))
+        counts = np.array([mode.n_real, mode.n_pairs, one.laws.size, *needs], dtype=np.int64)
+        pieces: list[NDArray[np.generic]] = [
+            np.array(_stage(one.command)), counts, _padded(mode.rates, (size,)),
+            _padded(mode.out_of, (n, size)), _padded(mode.into, (size, n)),
+            _padded((mode.into @ one.b).T, (2, size)),
+            _padded((mode.into @ one.g).T, (efforts, size)),
+            _padded((one.h @ mode.out_of).T, (size, arguments)),
+            _padded(one.k.T, (2, arguments)),
+            _padded(mode.out_of.T @ rows, (size, wide)),
+            _padded(rows_u, (2, wide)), _padded(rows_f, (efforts, wide)),
+            _padded(mode.out_of.T @ rows[:, :4], (size, _LANES)),
+            # What pads a set reads no argument: there may be none in the whole plant.
+            _padded(one.laws, (efforts,), int(Law.HEADING)),
+            _padded(one.coefficients, (efforts, WIDTH)), _padded(one.offsets, (efforts,)),
+            np.array([_first_step(mode)])]
+        for stack, piece in zip(stacks, pieces, strict=True):
+            stack.append(piece)
+    onset = np.zeros(2)
+    if plant.onset is not None and len(sets) > 1:
+        onset[:] = _ONSETS[plant.onset.kind], plant.onset.value
+    return Packed(onset, *(np.stack(stack) for stack in stacks))
+
+
+#: Bounds of the first step after a jump of the input [s].
+FIRST = (5e-5, 5e-4)
+
+
+def _first_step(modes: Modes) -> float:
+    fastest = np.max(np.abs(modes.rates), initial=1.0)
+    return float(np.clip(0.4 / fastest, *FIRST))
