@@ -81,7 +81,7 @@ def topics() -> str:
     for name, kind, text in TOPICS:
         row('in', name, kind.rpartition('/')[2], [f'~/{name}'] * 3, text)
     every = [published(preset) for preset in PRESETS]
-    fixed = {'/tf': 'odom_frame to base_frame (publish_tf)',
+    fixed = {'tf': 'odom_frame to base_frame (publish_tf)',
              '/clock': 'simulated time (publish_clock)'}
     for name, (_, kind) in every[0].items():
         row('out', name, kind.rpartition('/')[2], [one[name][0] for one in every],

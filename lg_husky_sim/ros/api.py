@@ -127,6 +127,13 @@ def service_type(name: str) -> Any:
     return getattr(importlib.import_module(f'{package}.srv'), kind)
 
 
+def parameter(name: str, value: object) -> Parameter:
+    """Return a parameter of the type that the value has."""
+    if not HAVE_RCLPY:
+        return Parameter.of(name, value)
+    return Parameter(name, value=value)  # type: ignore[call-arg]
+
+
 def parameter_overrides(node: Node) -> dict[str, Parameter]:
     """Return the parameters that command line and files give to a node, declared or not."""
     if not HAVE_RCLPY:
@@ -143,6 +150,22 @@ def join(arguments: Sequence[str]) -> None:
              signal_handler_options=SignalHandlerOptions.NO)  # type: ignore[call-arg]
     else:
         init(args=[*arguments], signals=False)
+
+
+def future() -> Any:
+    """Return what a callback of a service can wait for while others are served; rclpy only."""
+    from rclpy.task import Future
+    return Future()
+
+
+def own_arguments(words: Sequence[str]) -> list[str]:
+    """Return what of a command line is outside its --ros-args sections."""
+    own, inside = [], False
+    for word in words:
+        if not inside and word != '--ros-args':
+            own.append(word)
+        inside = (inside or word == '--ros-args') and not (inside and word == '--')
+    return own
 
 
 def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Any:
@@ -205,11 +228,14 @@ __all__ = [
     'SingleThreadedExecutor',
     'Time',
     'describe_backend',
+    'future',
     'init',
     'join',
     'leave',
     'message_type',
     'ok',
+    'own_arguments',
+    'parameter',
     'parameter_overrides',
     'qos_profile_sensor_data',
     'serialised',

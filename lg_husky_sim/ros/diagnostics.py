@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Achieved rate, late steps and real-time factor on /diagnostics."""
+"""Achieved rate, late steps and real-time factor on diagnostics."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Diagnostics:
         self._name = f'{node.get_fully_qualified_name().lstrip("/")}: simulation'
         if message_type(_KIND) is None:
             node.get_logger().warning(
-                '/diagnostics is not published: message package diagnostic_msgs is missing')
+                'diagnostics is not published: message package diagnostic_msgs is missing')
             return
-        self._publisher = node.create_publisher(message_type(_KIND), '/diagnostics', 10)
+        self._publisher = node.create_publisher(message_type(_KIND), 'diagnostics', 10)
 
     def count(self, lateness_ns: int, period_ns: float, simulated: float) -> None:
         """

@@ -211,7 +211,8 @@ class Engine:
             self.step_count, self.step_count * one.period, state.pose, state.twist,
             self._odometry.pose, self._odometry.twist, measured,
             (self._torque * left, self._torque * right), self._supply,
-            -(v_left * left + v_right * right) / self._supply)
+            # Not −0.0 at rest.
+            0.0 - (v_left * left + v_right * right) / self._supply)
 
     def reset(self, pose: Pose | None = None, *, time: bool = False,
               twist: BodyTwist | None = None) -> Reading:

@@ -48,7 +48,7 @@ class Outputs:
         if settings.publish_battery:
             self._battery = publish('sensor_msgs/msg/BatteryState', settings.battery_topic)
         if settings.publish_tf:
-            self._tf = publish('tf2_msgs/msg/TFMessage', '/tf', 100)
+            self._tf = publish('tf2_msgs/msg/TFMessage', 'tf', 100)
         if settings.publish_clock:
             self._clock = publish(CLOCK, '/clock')
         self.configure(settings)
@@ -80,6 +80,11 @@ class Outputs:
         if self._clock is not None and nanoseconds != self._said:
             self._said = nanoseconds
             conversions.set_stamp(self._clock_message.clock, nanoseconds)
+            self._clock.publish(self._clock_message)
+
+    def remind(self) -> None:
+        """Say the time on /clock once more, for who has joined since."""
+        if self._clock is not None and self._said >= 0:
             self._clock.publish(self._clock_message)
 
     def publish(self, reading: Reading, nanoseconds: int) -> None:

@@ -12,17 +12,17 @@ from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.ros.api import message_type, Node, Parameter, parameter_overrides
 from lg_husky_sim.ros.settings import (
     BY_NAME,
-    check_names,
     DEFAULT_PRESET,
     make_settings,
     preset_values,
     Setting,
     Settings,
     TABLE,
+    unknown,
 )
 
 #: Parameters that ROS itself gives to every node.
-_OF_ROS = ('use_sim_time', 'start_type_description_service', 'qos_overrides')
+_OF_ROS = ('use_sim_time', 'start_type_description_service')
 
 
 def _descriptor(setting: Setting) -> Any:
@@ -49,7 +49,9 @@ def declare_settings(node: Node) -> Settings:
     """
     Declare every setting on a node and return their values.
 
-    Whole numbers are taken where decimals are meant (``-p rate:=50``).
+    Whole numbers are taken where decimals are meant (``-p rate:=50``). What is given and is no
+    setting (parameters of a whole launch, or of another node of the process) is left alone, as
+    every node does, with a warning.
 
     Parameters
     ----------
@@ -63,13 +65,16 @@ def declare_settings(node: Node) -> Settings:
     Raises
     ------
     SettingsError
-        If a given name is unknown, or a value not allowed.
+        If a value is not allowed.
 
     """
     given = {name: parameter.value for name, parameter in parameter_overrides(node).items()
-             if name.split('.')[0] not in _OF_ROS}
-    check_names(given)
-    settings = make_settings(given)
+             if name not in _OF_ROS}
+    for name in sorted(set(given) - set(BY_NAME)):
+        node.get_logger().warning(
+            'qos_overrides have no effect: the quality of service is fixed (docs/ros.md)'
+            if name.startswith('qos_overrides.') else f'{unknown(name)}; it is ignored')
+    settings = make_settings({name: value for name, value in given.items() if name in BY_NAME})
     for setting in TABLE:
         value = _plain(getattr(settings, setting.name))
         node.declare_parameter(setting.name, value, _descriptor(setting), ignore_override=True)

@@ -31,9 +31,9 @@ _TOPICS = (
      'voltage and current once a second, `publish_battery`'),
 )
 _FIXED = (
-    ('/tf', 'tf2_msgs/TFMessage', 'out', 'odom to base_link, every step, `publish_tf`'),
+    ('tf', 'tf2_msgs/TFMessage', 'out', 'odom to base_link, every step, `publish_tf`'),
     ('/clock', 'rosgraph_msgs/Clock', 'out', 'simulated time, every step, `publish_clock`'),
-    ('/diagnostics', 'diagnostic_msgs/DiagnosticArray', 'out',
+    ('diagnostics', 'diagnostic_msgs/DiagnosticArray', 'out',
      'rate and lateness once a second, `publish_diagnostics`'),
 )
 

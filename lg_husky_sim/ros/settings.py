@@ -146,11 +146,11 @@ TABLE: tuple[Setting, ...] = (
     Setting('odom_frame', str, 'frame of poses'),
     Setting('base_frame', str, 'frame of the robot'),
     Setting('imu_frame', str, 'frame of the IMU'),
-    Setting('publish_tf', bool, 'publish odom_frame to base_frame on /tf'),
-    Setting('tf_source', str, 'what /tf shows: the truth, or the wheel odometry',
+    Setting('publish_tf', bool, 'publish odom_frame to base_frame on tf'),
+    Setting('tf_source', str, 'what tf shows: the truth, or the wheel odometry',
             choices=('ground_truth', 'wheels')),
     Setting('publish_battery', bool, "publish the battery's state once a second"),
-    Setting('publish_diagnostics', bool, 'publish rate and lateness on /diagnostics every second'),
+    Setting('publish_diagnostics', bool, 'publish rate and lateness on diagnostics every second'),
     Setting('joint_names', tuple, 'front left, front right, rear left, rear right'),
     Setting('odometry_covariance', tuple, 'diagonal of pose and twist: x y z roll pitch yaw'),
     Setting('joint_states_rate', float, 'messages per simulated second; 0: as rate', 'Hz', 0.0,
@@ -308,9 +308,13 @@ def check_names(names: Mapping[str, object] | set[str]) -> None:
 
     """
     for name in sorted(set(names) - set(BY_NAME)):
-        near = difflib.get_close_matches(name, BY_NAME, n=1, cutoff=0.5)
-        hint = f'; did you mean {near[0]}?' if near else ''
-        raise SettingsError(f'parameter {name} is unknown{hint}')
+        raise SettingsError(unknown(name))
+
+
+def unknown(name: str) -> str:
+    """Return that a name is no setting, with the nearest one there is."""
+    near = difflib.get_close_matches(name, BY_NAME, n=1, cutoff=0.5)
+    return f'parameter {name} is unknown' + (f'; did you mean {near[0]}?' if near else '')
 
 
 def make_settings(values: Mapping[str, object] | None = None, **more: object) -> Settings:

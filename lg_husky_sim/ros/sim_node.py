@@ -70,6 +70,10 @@ def _run(args: Sequence[str] | None) -> int:
     except LgHuskyError as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
+    if foreign := api.own_arguments(words[1:]):
+        print(f'error: unknown argument {foreign[0]!r}: parameters go behind --ros-args -p, such '
+              'as --ros-args -p rate:=100.0 (see sim_node -h)', file=sys.stderr)
+        return 1
     node: Any = None
     joined, code = False, 0
     # From here on the middleware's own handlers shut the graph down, which ends spinning. What
@@ -79,7 +83,7 @@ def _run(args: Sequence[str] | None) -> int:
     try:
         api.init(args=words)
         joined = True
-        node = SimNode(NAME, started=started)
+        node = SimNode(NAME, started=started, leave=api.leave)
         # What is loaded now stays: the garbage collector need not look through it at each turn,
         # which would make steps late.
         gc.freeze()

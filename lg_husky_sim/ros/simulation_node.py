@@ -4,17 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 import time
 from typing import Any
 
 from lg_husky_sim.ros import conversions
-from lg_husky_sim.ros.api import describe_backend, leave, message_type, Node
+from lg_husky_sim.ros.api import describe_backend, message_type, Node, steady_timer
+from lg_husky_sim.ros.clockwork import Clockwork
 from lg_husky_sim.ros.control import Control
 from lg_husky_sim.ros.diagnostics import Diagnostics
 from lg_husky_sim.ros.engine import Engine, Reading
+from lg_husky_sim.ros.neighbours import announce, Neighbours
 from lg_husky_sim.ros.outputs import Outputs
-from lg_husky_sim.ros.pacing import Pace, Stamps
 from lg_husky_sim.ros.parameters import declare_settings, LiveSettings
 from lg_husky_sim.ros.settings import Settings
 from lg_husky_sim.ros.standard_control import StandardControl
@@ -25,8 +27,8 @@ _SECOND = 1_000_000_000
 _TICK = 0.001
 #: Longest stay in one callback while catching up or running free [ns].
 _BUNCH = 20_000_000
-#: A ROS clock that is off by this much has jumped [ns].
-_JUMP = 100_000_000
+#: Time between two messages on /clock while paused, for who joins late [ns].
+_REMINDER = 200_000_000
 
 
 class SimNode(Node):
@@ -38,6 +40,9 @@ class SimNode(Node):
     name : str
     started : float, optional
         When the process began on ``time.monotonic`` [s], to log how long the start took.
+    leave : callable, optional
+        Ends the process that runs the node, when a service asks for it; without it, the node is
+        a guest in somebody's process and refuses.
     **kwargs
         For the node, such as ``namespace``.
 
@@ -48,7 +53,8 @@ class SimNode(Node):
 
     """
 
-    def __init__(self, name: str, *, started: float | None = None, **kwargs: Any) -> None:
+    def __init__(self, name: str, *, started: float | None = None,
+                 leave: Callable[[Node], None] | None = None, **kwargs: Any) -> None:
         """Declare, load, publish the first odometry and start the clockwork."""
         super().__init__(name, **kwargs)
         log = self.get_logger()
@@ -60,7 +66,14 @@ class SimNode(Node):
         if self.settings.publish_diagnostics:
             self.diagnostics = Diagnostics(self)
         self.paused = self.settings.start_paused
+        self._leave = leave
         self._timer: Any = None
+        self._pending = 0
+        self._when_done: list[Callable[[bool], None]] = []
+        self._reminded = 0
+        self._clockwork = Clockwork(
+            lambda: int(self.get_clock().now().nanoseconds), self._follows_clock,
+            lambda text: log.warning(text, throttle_duration_sec=1.0))
         # Who waits for the first odometry expects the robot to answer from then on, and without
         # machine code on disk compiling takes seconds.
         self._warm_up()
@@ -71,6 +84,8 @@ class SimNode(Node):
         self.control = Control(self, self)
         self.standard = StandardControl(self, self)
         self._resume()
+        announce(self, self.settings)
+        self._neighbours = Neighbours(self, self.settings)
         if started is not None:
             took = time.monotonic() - started
             log.info(f'running with preset {self.settings.preset} at '
@@ -125,70 +140,78 @@ class SimNode(Node):
 
     # --- time -------------------------------------------------------------------------------
 
+    def _follows_clock(self) -> bool:
+        """Return whether somebody else's /clock is the authority on time."""
+        return not self.settings.publish_clock and bool(
+            self.get_parameter('use_sim_time').value)
+
     def _now_stamp(self) -> int:
         if self.settings.publish_clock:
             return round(self.engine.reading.time * _SECOND)
-        return self.get_clock().now().nanoseconds
+        return int(self.get_clock().now().nanoseconds)
 
     def _resume(self) -> None:
-        one, now = self.settings, time.monotonic_ns()
-        speed = one.speed or 1.0
-        self._pace = Pace(now, self.engine.total, one.rate, speed)
-        self._stamps = Stamps(self.get_clock().now().nanoseconds, self.engine.total,
-                              _SECOND / (one.rate * speed))
+        one = self.settings
+        self._clockwork.resume(one, self.engine.total)
         if self._timer is not None:
             self.destroy_timer(self._timer)
-        period = _TICK if one.speed == 0.0 else max(_TICK, one.period / speed)
-        self._timer = self.create_timer(period, self._tick)
+        period = _TICK if one.speed == 0.0 else max(_TICK, one.period / one.speed)
+        self._timer = steady_timer(self, period, self._tick)
 
     def _stamp(self) -> int:
         if self.settings.publish_clock:
             return round(self.engine.reading.time * _SECOND)
-        return self._stamps.of(self.engine.total)
-
-    def _follow_clock_jumps(self) -> None:
-        behind = self._pace.due(time.monotonic_ns(), self.engine.total)
-        expected = self._stamps.of(self.engine.total + behind)
-        now: int = self.get_clock().now().nanoseconds
-        if abs(now - expected) > _JUMP:
-            self.get_logger().warning(
-                f'the clock jumped by {(now - expected) / _SECOND:+.3f} s; stamps follow it',
-                throttle_duration_sec=1.0)
-            self._stamps = Stamps(now, self.engine.total + behind, self._stamps.spacing)
+        return self._clockwork.stamp(self.engine.total)
 
     def _tick(self) -> None:
-        if not self.paused:
-            if self.settings.speed == 0.0:
-                self._run_free()
-            else:
-                if not self.settings.publish_clock:
-                    self._follow_clock_jumps()
-                self._catch_up()
+        if not self.settings.publish_clock:
+            self._clockwork.look(self.engine.total)
+        if self.paused:
+            self._make_pending()
+        elif self._clockwork.free:
+            self._run_free()
+        else:
+            self._catch_up()
         if self.diagnostics is not None:
             self.diagnostics.report(
-                time.monotonic_ns(), self._stamp(), self.settings.rate * self.settings.speed,
+                time.monotonic_ns(), self._now_stamp(), self.settings.rate * self.settings.speed,
                 paused=self.paused)
 
     def _catch_up(self) -> None:
-        now = time.monotonic_ns()
-        count = self._pace.due(now, self.engine.total)
-        end = now + _BUNCH
+        count = self._clockwork.due(self.engine.total)
+        end = time.monotonic_ns() + _BUNCH
         for _ in range(count):
-            moment = self._pace.moment(self.engine.total + 1)
-            self._step(now - moment)
-            now = time.monotonic_ns()
-            if now > end:
+            self._step(self._clockwork.lateness(self.engine.total + 1))
+            if time.monotonic_ns() > end:
                 # The rest stays due; commands are listened to in between.
                 break
 
     def _run_free(self) -> None:
         end = time.monotonic_ns() + _BUNCH
-        now = 0
-        self._stamps = Stamps(self.get_clock().now().nanoseconds, self.engine.total,
-                              _SECOND / self.settings.rate)
-        while now < end:
+        while time.monotonic_ns() < end:
             self._step(0)
-            now = time.monotonic_ns()
+
+    def _make_pending(self) -> None:
+        # In bunches, so that a long request can be interrupted.
+        end = time.monotonic_ns() + _BUNCH
+        while self._pending and time.monotonic_ns() < end:
+            self._pending -= 1
+            self._step(0)
+        if not self._pending:
+            self._tell_done(True)
+        now = time.monotonic_ns()
+        if now - self._reminded > _REMINDER:
+            self._reminded = now
+            self.outputs.remind()
+
+    def _tell_done(self, done: bool) -> None:
+        waiting, self._when_done = self._when_done, []
+        for tell in waiting:
+            tell(done)
+
+    def _interrupt(self) -> None:
+        self._pending = 0
+        self._tell_done(False)
 
     def _step(self, lateness_ns: int) -> None:
         self.engine.step()
@@ -205,18 +228,31 @@ class SimNode(Node):
     # --- control ----------------------------------------------------------------------------
 
     def pause(self, paused: bool) -> None:
-        """Pause or resume; simulated time stands while paused."""
+        """Pause or resume; simulated time stands while paused. Ends what is left of steps."""
         self.stopped = False
+        self._interrupt()
         if self.paused and not paused:
             self.paused = False
             self._resume()
         self.paused = paused
 
-    def advance(self, count: int) -> None:
-        """Make steps while paused, as fast as possible."""
+    def advance(self, count: int, done: Callable[[bool], None] | None = None) -> None:
+        """
+        Make steps while paused, as fast as possible; others are listened to in between.
+
+        Parameters
+        ----------
+        count : int
+        done : callable, optional
+            Is told True once all are made, or False if a pause, resume or reset came between.
+
+        """
         self.stopped = False
-        for _ in range(count):
-            self._step(0)
+        self._pending += count
+        if done is not None:
+            self._when_done.append(done)
+        # What takes no time is done when the request is answered.
+        self._make_pending()
 
     def reset(self, *, time: bool) -> None:
         """Go to the initial pose at rest; optionally begin simulated time anew."""
@@ -237,9 +273,13 @@ class SimNode(Node):
         self.reset(time=True)
         self.stopped = True
 
-    def end(self) -> None:
-        """End the node as Ctrl-C does, once the answer to the request is out."""
-        self.create_timer(0.2, lambda: leave(self))
+    def end(self) -> bool:
+        """End the process as Ctrl-C does, once the answer is out; not that of somebody else."""
+        leave = self._leave
+        if leave is None:
+            return False
+        steady_timer(self, 0.2, lambda: leave(self))
+        return True
 
     @property
     def reading(self) -> Reading:
@@ -252,6 +292,7 @@ class SimNode(Node):
         return self.settings.odom_frame
 
     def _restart(self, pose: Pose | None, *, time: bool, twist: BodyTwist | None = None) -> None:
+        self._interrupt()
         self.engine.reset(pose, time=time, twist=twist)
         self.outputs.forget()
         if self.paused:

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 from typing import Any, Protocol
 
-from lg_husky_sim.ros import conversions
+from lg_husky_sim.ros import api, conversions
 from lg_husky_sim.ros.api import message_type, Node, service_type
 from lg_husky_sim.ros.control import MOST_STEPS
 from lg_husky_sim.ros.engine import Reading
@@ -50,8 +51,8 @@ class Simulation(Protocol):
     def pause(self, paused: bool) -> None:
         """Pause or resume."""
 
-    def advance(self, count: int) -> None:
-        """Make steps while paused."""
+    def advance(self, count: int, done: Callable[[bool], None] | None = None) -> None:
+        """Make steps while paused, and tell whether all were made."""
 
     def reset(self, *, time: bool) -> None:
         """Go back to the initial pose."""
@@ -65,8 +66,8 @@ class Simulation(Protocol):
     def stop(self) -> None:
         """Pause, in the initial state at time zero."""
 
-    def end(self) -> None:
-        """End the node."""
+    def end(self) -> bool:
+        """End the process, if it is the node's own."""
 
 
 def service_name(kind: str) -> str:
@@ -120,7 +121,9 @@ class StandardControl:
             response.result.result = _ALREADY
             response.result.error_message = 'already in this state'
         elif wanted == _QUITTING:
-            one.end()
+            if not one.end():
+                response.result.result = _UNSUPPORTED
+                response.result.error_message = 'the node is a guest in this process'
         elif wanted == _STOPPED:
             one.stop()
         elif wanted in (_PLAYING, _PAUSED):
@@ -143,7 +146,8 @@ class StandardControl:
             self._simulation.reset_clock()
         return response
 
-    def _step(self, request: Any, response: Any) -> Any:
+    async def _step(self, request: Any, response: Any) -> Any:
+        # The answer waits for the steps and others are served meanwhile.
         response.result.result = _OK
         if not self._simulation.paused:
             response.result.result = _INCORRECT_STATE
@@ -152,7 +156,11 @@ class StandardControl:
             response.result.result = _FAILED
             response.result.error_message = f'steps = {request.steps}: from 1 to {MOST_STEPS}'
         else:
-            self._simulation.advance(int(request.steps))
+            future = api.future()
+            self._simulation.advance(int(request.steps), future.set_result)
+            if not await future:
+                response.result.result = _FAILED
+                response.result.error_message = 'interrupted by a pause, a resume or a reset'
         return response
 
     def _entities(self, request: Any, response: Any) -> Any:

@@ -23,6 +23,8 @@ from lg_husky_sim.ros import api
 _DOMAINS = range(10, 100)
 #: A socket bound here says that a domain is taken.
 _LOCK_PORT = 21_400
+#: Longest wait of a probe in one piece [s].
+_WAIT = 0.01
 
 
 @contextmanager
@@ -47,6 +49,9 @@ def isolated_domain() -> Iterator[int]:
     first = os.getpid() % len(_DOMAINS)
     for place in range(len(_DOMAINS)):
         domain = _DOMAINS[(first + place) % len(_DOMAINS)]
+        if str(domain) == before['ROS_DOMAIN_ID']:
+            # The user's own robot may be there.
+            continue
         lock = socket.socket()
         try:
             lock.bind(('127.0.0.1', _LOCK_PORT + domain))
@@ -159,8 +164,10 @@ class Probe:
     def spin(self, seconds: float) -> None:
         """Serve callbacks for some time [s]."""
         end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0.0:
-            self._executor.spin_once(timeout_sec=left)
+        # Always the same wait: rclpy forgets who is ready when it changes, and then serves the
+        # first topics only.
+        while time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=_WAIT)
 
     def until(self, condition: Callable[[], object], timeout: float = 15.0) -> bool:
         """
@@ -183,7 +190,7 @@ class Probe:
         while not condition():
             if time.monotonic() > end:
                 return False
-            self._executor.spin_once(timeout_sec=0.02)
+            self._executor.spin_once(timeout_sec=_WAIT)
         return True
 
     def close(self) -> None:

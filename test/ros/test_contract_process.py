@@ -164,7 +164,8 @@ def test_a_parameter_file_and_the_command_line(probe: Probe, start: Start, tmp_p
 
 
 MISTAKES = (
-    (['-p', 'spede:=2.0'], 'parameter spede is unknown; did you mean speed?'),
+    (['--', '--rate', '3'], "unknown argument '--rate': parameters go behind --ros-args -p"),
+    (['--', 'rate:=3'], "unknown argument 'rate:=3'"),
     (['-p', 'rate:=5000.0'], 'rate = 5000.0 is not allowed: from 1 to 1000 Hz'),
     (['-p', 'rate:=.nan'], 'rate = nan is not allowed: from 1 to 1000 Hz'),
     (['-p', 'preset:=rover'], 'one of paper, husky_ros1, clearpath_jazzy'),
@@ -196,7 +197,7 @@ def test_mistakes_end_with_one_line_and_exit_code_one(probe: Probe) -> None:
 
 def test_a_mistake_ends_the_process_with_exit_code_one(probe: Probe) -> None:
     """The exit code reaches the shell."""
-    node = NodeProcess({'spede': 2.0})
+    node = NodeProcess({'speed': -2.0})
     assert node.process.wait(30.0) == 1
 
 
@@ -282,7 +283,7 @@ def test_settings_of_the_presets_differ_together() -> None:
     paper, ros1, jazzy = (make_settings(preset=p) for p in (
         'paper', 'husky_ros1', 'clearpath_jazzy'))
     assert (paper.imu_topic, ros1.imu_topic, jazzy.imu_topic) == (
-        '/imu_um7/data', '/imu/data', 'sensors/imu_0/data')
+        'imu_um7/data', 'imu/data', 'sensors/imu_0/data')
     assert (ros1.max_yaw, jazzy.max_yaw, paper.max_yaw) == (2.0, 1.0, 0.0)
     assert (ros1.command_timeout, jazzy.command_timeout) == (0.25, 0.5)
     assert (ros1.wheel_separation, jazzy.wheel_separation) == (0.5708, 0.555)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 import signal
 import subprocess
@@ -58,6 +59,7 @@ def test_failures_on_a_disturbed_machine_are_asked_again(
     ran = subprocess.run(
         [sys.executable, '-m', 'pytest', '-rs', '-p', 'no:cacheprovider', '-p', 'no:xdist',
          '--rootdir', str(tmp_path), str(tmp_path)],
+        env={name: value for name, value in os.environ.items() if name != 'PYTEST_ADDOPTS'},
         capture_output=True, text=True, timeout=120.0, check=False)
     assert f'= {wanted} in ' in ran.stdout, ran.stdout
     assert ran.returncode == ('failed' in wanted)

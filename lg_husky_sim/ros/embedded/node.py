@@ -42,10 +42,13 @@ class Node:
     ----------
     node_name : str
     namespace : str
+    parameter_overrides : sequence of Parameter, optional
+        Count more than the command line.
 
     """
 
-    def __init__(self, node_name: str, *, namespace: str = '') -> None:
+    def __init__(self, node_name: str, *, namespace: str = '',
+                 parameter_overrides: Sequence[Parameter] | None = None) -> None:
         """Join the graph."""
         self.context = default_context()
         self._names = NodeNames.resolve(node_name, namespace, self.context.arguments)
@@ -57,7 +60,8 @@ class Node:
         self._clock_subscription: Subscription | None = None
         #: Grows with each endpoint, so that a spin loop knows when to look again.
         self.version = 0
-        self.parameter_store = ParameterStore(self._names.parameters())
+        self.parameter_store = ParameterStore(self._names.parameters() | {
+            one.name: one.value for one in parameter_overrides or ()})
         self.context.nodes.append(self)
         self._rosout = self.create_publisher(
             message_class('rcl_interfaces/msg/Log'), '/rosout', qos_profile_rosout)

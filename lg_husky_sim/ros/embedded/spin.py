@@ -40,7 +40,8 @@ class SingleThreadedExecutor:
         self._attached.clear()
 
     def _current(self) -> WaitSet:
-        seen = tuple(node.version for node in self._nodes)
+        # By the node as well: one that is exchanged for another may have come as far.
+        seen = tuple(part for node in self._nodes for part in (id(node), node.version))
         if self._waitset is None or seen != self._seen:
             waitset = WaitSet(self._context.participant)
             waitset.attach(self._context.guard)

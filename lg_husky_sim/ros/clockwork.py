@@ -1,0 +1,121 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""When each step is due and which stamp it gets; knows clocks as functions, and no node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import time
+
+from lg_husky_sim.ros.pacing import Pace, Stamps
+from lg_husky_sim.ros.settings import Settings
+
+_SECOND = 1_000_000_000
+#: A ROS clock that moves against the steady one by this much between two looks has jumped [ns].
+_JUMP = 100_000_000
+
+
+class Clockwork:
+    """
+    Pace and stamps of the node.
+
+    The steady clock paces, so that no jump of another clock makes the robot stand or run. Only
+    where somebody else is the authority on time (``use_sim_time`` without ``publish_clock``) the
+    steps follow /clock. Stamps never run back but with simulated time.
+
+    Parameters
+    ----------
+    ros_now : callable
+        The node's clock [ns].
+    follows : callable
+        Whether that clock is the authority.
+    warn : callable
+        Is told of jumps.
+
+    """
+
+    def __init__(self, ros_now: Callable[[], int], follows: Callable[[], bool],
+                 warn: Callable[[str], object]) -> None:
+        """Stand still until :meth:`resume`."""
+        self._ros_now, self._follows, self._warn = ros_now, follows, warn
+        self._following = self._heard = False
+        self._last = 0
+        self._offset = 0
+
+    def resume(self, settings: Settings, total: int) -> None:
+        """
+        Go on from now.
+
+        Parameters
+        ----------
+        settings : Settings
+            Rate and speed.
+        total : int
+            Steps done so far.
+
+        """
+        self._settings = settings
+        self._following = self._follows()
+        speed = 1.0 if self._following else settings.speed or 1.0
+        now = self._ros_now()
+        self._heard = now > 0
+        self._pace = Pace(now if self._following else time.monotonic_ns(), total, settings.rate,
+                          speed)
+        if not self._following:
+            # Steps made while paused may have gone ahead of the clock.
+            now = max(now, self._last)
+        self._stamps = Stamps(now, total, _SECOND / (settings.rate * speed))
+        self._offset = self._ros_now() - time.monotonic_ns()
+
+    def _now(self) -> int:
+        return self._ros_now() if self._following else time.monotonic_ns()
+
+    @property
+    def free(self) -> bool:
+        """Whether steps are made as fast as possible."""
+        return self._settings.speed == 0.0 and not self._following
+
+    def look(self, total: int) -> None:
+        """Notice jumps of the clocks; call before asking what is due."""
+        if self._follows() != self._following:
+            self.resume(self._settings, total)
+            return
+        now = self._ros_now()
+        if self._following:
+            if not self._heard and now > 0:
+                # The first word of /clock says where time stands, not that it has passed.
+                self.resume(self._settings, total)
+            elif now < self._last:
+                self._warn(f'/clock went back by {(self._last - now) / _SECOND:.3f} s; steps and '
+                           'stamps begin there anew')
+                self._last = 0
+                self.resume(self._settings, total)
+            return
+        moved = now - time.monotonic_ns() - self._offset
+        if abs(moved) <= _JUMP:
+            return
+        self._offset += moved
+        if moved > 0:
+            self._warn(f'the clock jumped by {moved / _SECOND:+.3f} s; stamps follow it')
+            self._stamps = Stamps(self._stamps.anchor_ns + moved, self._stamps.anchor_step,
+                                  self._stamps.spacing)
+        else:
+            self._warn(f'the clock jumped by {moved / _SECOND:+.3f} s; stamps never run back and '
+                       'go on as before')
+
+    def due(self, total: int) -> int:
+        """Return how many steps are due."""
+        return self._pace.due(self._now(), total)
+
+    def lateness(self, step: int) -> int:
+        """Return for how long a step has been due [ns]."""
+        return self._now() - self._pace.moment(step)
+
+    def stamp(self, total: int) -> int:
+        """Return the stamp of the step that was done last [ns]."""
+        if self.free:
+            # More steps than time: each gets its moment, and no two the same.
+            self._stamps = Stamps(max(self._ros_now(), self._last + 1), total,
+                                  self._stamps.spacing)
+        self._last = max(self._last, self._stamps.of(total))
+        return self._last
