@@ -26,6 +26,8 @@ EXTRAS = {
         ' or sys_platform == "darwin")',
     ],
     'engine': ['mujoco>=3.1'],
+    # Not part of `all`: where PyPI has no wheel, it is built by a C++ compiler.
+    'bullet': ['pybullet>=3.2.5'],
     'scale': ['dask[distributed]>=2024.1'],
     'search': ['deap>=1.4'],
     'report': ['jinja2>=3.1', 'plotly>=6.0'],

@@ -20,6 +20,7 @@ EXTRA_OF = {
     'numba': 'fast',
     'pandas': 'tables',
     'plotly': 'report',
+    'pybullet': 'bullet',
     'rosbags': 'bags',
 }
 """Importable module to the extra of setup.py that brings it."""

@@ -52,8 +52,9 @@ OWNERS = {
 """Library to the parts that may import it; ros takes message definitions from
 rosbags, and proof writes bags with code of its own, as the blind trial shares none."""
 
-ONLY_INSIDE_FUNCTIONS = {'sympy', 'matplotlib', 'mujoco', 'dask', 'distributed', 'rosbags',
-                         'cyclonedds', 'jinja2', 'pandas', 'control', 'plotly', 'PIL'}
+ONLY_INSIDE_FUNCTIONS = {'sympy', 'matplotlib', 'mujoco', 'pybullet', 'dask', 'distributed',
+                         'rosbags', 'cyclonedds', 'jinja2', 'pandas', 'control', 'plotly',
+                         'PIL'}
 """Slow to import or optional: the package imports without them. The
 backends of ros are chosen at run time, each in files of its own that import what they need."""
 

@@ -12,9 +12,6 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from lg_husky_sim.proof.scoring import Judgement
-    from lg_husky_sim.proof.trial import Folders
-
 
 @click.command(short_help='Try the diagnosis blind on robots with hidden physics.')
 @click.option('--cases', type=click.IntRange(1, 5000), default=30, show_default=True,
@@ -23,102 +20,132 @@ if TYPE_CHECKING:
               help='Seed of the first robot, the next has N + 1; 1 by default, 10000 with '
                    '--report.')
 @click.option('--tuning/--report', 'tuning', default=True,
-              help='Seeds below 10000 are for tuning, others for a report; never both.')
-@click.option('--world', type=click.Choice(['g1', 'g2', 'g3', 'mix']), default='g1',
-              show_default=True, help='Open-loop fine-step robot, rigid-body engine, real tyres '
-                                      'with a speed loop, or 70 %, 12 % and 18 % of them.')
-@click.option('--set', 'drive', default='mix', show_default=True,
-              type=click.Choice(['paper', 'full', 'drive-like', 'mix']),
-              help="Manoeuvres: the paper's three, six with reversals, steps of 6 s.")
+              help='Seeds below 10000 are for tuning, without the families left out of it; '
+                   'others for a report, with all.')
+@click.option('--world', type=click.Choice(['g1', 'g2', 'g3', 'g4', 'mix']), default='g1',
+              show_default=True, help='Open-loop fine-step robot, MuJoCo, four tyres with a '
+                                      'speed loop, Bullet, or a mixture.')
 @click.option('--jobs', type=click.IntRange(1, 256), default=2, show_default=True,
               help='Cases at the same time.')
-@click.option('--out', required=True, type=click.Path(path_type=Path), metavar='DIR',
+@click.option('--out', type=click.Path(path_type=Path), metavar='DIR',
               help='Folder of the trial; the same call resumes an interrupted one.')
+@click.option('--given', type=click.Path(path_type=Path, exists=True, file_okay=False),
+              metavar='DIR', help='Cases that somebody else made (DIR/cases, DIR/answers) '
+                                  'instead of our own.')
+@click.option('--held-out/--no-held-out', default=True,
+              help='Measure the share of the achievable improvement on drives not shown.')
 @click.option('--generate-only', is_flag=True, help='Make and seal the cases; diagnose nothing.')
 @click.option('--score-only', is_flag=True,
               help='Score the cases that are diagnosed already; diagnose nothing.')
-@click.option('--pool', 'pooled', multiple=True, type=click.Path(path_type=Path), metavar='DIR',
-              help='Count the cases of another trial, scored before, with this one.')
+@click.option('--from', 'sources', multiple=True, metavar='FILE.jsonl',
+              type=click.Path(path_type=Path, exists=True, dir_okay=False),
+              help='Outcomes of earlier trials: make tables and page from them, drive nothing.')
 @click.option('--page', type=click.Path(path_type=Path), metavar='FILE.md',
-              help='Also write the results as a page, with pictures beside it.')
+              help='Also write the results as a page, with pictures and outcomes beside it.')
 def command(
-    cases: int, seed: int | None, tuning: bool, world: str, drive: str, jobs: int, out: Path,
-    generate_only: bool, score_only: bool, pooled: tuple[Path, ...], page: Path | None,
+    cases: int, seed: int | None, tuning: bool, world: str, jobs: int, out: Path | None,
+    given: Path | None, held_out: bool, generate_only: bool, score_only: bool,
+    sources: tuple[Path, ...], page: Path | None,
 ) -> None:
     """
     Try the diagnosis blind on robots with hidden physics.
 
     A generator that shares no code with the diagnosis makes the recordings; the answers are
     sealed before the first diagnosis and opened after the last. DIR gets the recordings, the
-    answers, the diagnoses, results.json, results.md and pictures.
+    answers, the diagnoses, and outcomes.jsonl (one line a case), from which --from makes
+    every figure again in seconds.
     """
     from lg_husky_sim.errors import CommandError
+    from lg_husky_sim.proof import outcomes
+
+    if sources:
+        if out or given or generate_only or score_only:
+            raise CommandError('--from makes figures of earlier trials; it goes with --page only')
+        _report([(path, *outcomes.read(path)) for path in sources], page, sources)
+        return
+    if out is None:
+        raise CommandError('--out DIR is missing: where the trial is kept')
+    path = _trial(cases, seed, tuning, world, jobs, out, given, held_out, generate_only,
+                  score_only)
+    if path is not None:
+        _report([(path, *outcomes.read(path))], page, ())
+        click.echo(f'details: {path}')
+
+
+def _trial(cases: int, seed: int | None, tuning: bool, world: str, jobs: int, out: Path,
+           given: Path | None, held_out: bool, generate_only: bool,
+           score_only: bool) -> Path | None:
+    """Make, diagnose and open the cases; return the file of outcomes."""
     from lg_husky_sim.extras import require
-    from lg_husky_sim.proof import plan, trial
+    from lg_husky_sim.proof import outcomes, plan, trial
+    from lg_husky_sim.proof.sealing import commitment
 
     require('rosbags', 'write the recordings of a trial')
-    first = seed if seed is not None else (1 if tuning else plan.FIRST_REPORT_SEED)
-    plan.check_seeds(first, cases, report=not tuning)
-    specs = plan.plan(cases, first, world, drive)
-    together = [path.resolve() for path in (*pooled, out)]
-    if len(set(together)) < len(together):
-        raise CommandError('--pool names a folder twice, or that of --out; each trial counts once')
-    others = [trial.scored(root) for root in pooled]
-    for _, other in others:
-        plan.check_seeds(other['first_seed'], other['planned'], report=not tuning)
-    folders = trial.Folders(out)
-    trial.keep_plan(folders, specs)
-    names = [trial.name_of(k) for k in range(cases)]
-    with click.progressbar(length=cases, label='hiding  ') as bar:
-        sealed = trial.prepare(folders, specs, jobs, lambda _: bar.update(1))
-    seal = _seal_of(sealed, names)
-    click.echo(f'{cases} answers sealed, commitment {seal}')
+    folders = trial.Folders(out, given)
+    if given is not None:
+        sealed, name = trial.given(given)
+        called, seeds = '--given CASES', '-'
+    else:
+        first = seed if seed is not None else (1 if tuning else plan.first_report_seed())
+        plan.check_seeds(first, cases, report=not tuning)
+        specs = plan.plan(cases, first, world, tuning)
+        trial.keep_plan(folders, specs)
+        with click.progressbar(length=cases, label='hiding  ') as bar:
+            sealed = trial.prepare(folders, specs, jobs, lambda _: bar.update(1), held_out)
+        name = 'tuning' if tuning else 'report'
+        called = f'--cases {cases} --seed {first} --{name} --world {world}' \
+            + ('' if held_out else ' --no-held-out')
+        seeds = f'{first} to {first + cases - 1}'
+    names = list(sealed)
+    seal = commitment(sealed)
+    click.echo(f'{len(names)} answers sealed, commitment {seal}')
     if generate_only:
-        return
+        return None
     if score_only:
         names = trial.diagnosed(folders, names)
     else:
-        with click.progressbar(length=cases, label='diagnosing') as bar:
+        with click.progressbar(length=len(names), label='diagnosing') as bar:
             for _ in trial.diagnose_all(folders, names, jobs):
                 bar.update(1)
-    called = (f'lg_husky prove --cases {cases} --seed {first} '
-              f'--{"tuning" if tuning else "report"} --world {world} --set {drive} --out DIR'
-              + ' --pool OTHER' * len(pooled))
-    facts = {'command': called, 'planned': cases, 'seal': seal, 'first_seed': first,
-             'last_seed': first + cases - 1}
-    judged = trial.open_and_judge(folders, sealed, names)
-    if others:
-        facts['trials'] = [*(other for _, other in others), {**facts, 'cases': len(judged)}]
-    _report(folders, (*(one for before, _ in others for one in before), *judged), facts, page)
+    lines = trial.opened(folders, sealed, names)
+    outcomes.write(folders.outcomes, {
+        'command': f'lg_husky prove {called} --out DIR', 'commit': trial.commit(),
+        'planned': len(sealed), 'seal': seal, 'seeds': seeds, 'set': name}, lines)
+    return folders.outcomes
 
 
-def _seal_of(sealed: dict[str, str], names: Sequence[str]) -> str:
-    """Return one commitment to all answers."""
-    from lg_husky_sim.proof.sealing import commitment
-    return commitment({name: sealed[name] for name in names})
-
-
-def _report(folders: Folders, judged: Sequence[Judgement], facts: dict[str, Any],
-            page: Path | None) -> None:
-    """Print what was judged, and write the results and the page."""
-    from dataclasses import asdict
+def _report(trials: Sequence[tuple[Path, dict[str, Any], list[dict[str, Any]]]],
+            page: Path | None, sources: Sequence[Path]) -> None:
+    """Print what was judged, and write the page with its outcomes and pictures."""
     from importlib.util import find_spec
 
+    from lg_husky_sim.proof import outcomes
     from lg_husky_sim.proof import page as pages
-    from lg_husky_sim.proof.cases import plain
     from lg_husky_sim.proof.pictures import draw
-    from lg_husky_sim.proof.sealing import write_json
+    from lg_husky_sim.proof.scoring import judge
     from lg_husky_sim.proof.summary import summarise
 
-    results = {**summarise(judged), **facts}
-    write_json(folders.root / 'results.json', plain({
-        **results, 'judgements': [asdict(one) for one in judged]}))
+    sections: dict[str, tuple[dict[str, Any], list[dict[str, Any]]]] = {}
+    for name in pages.TITLES:
+        ours = [(facts, rows) for _, facts, rows in trials if facts['set'] == name]
+        if ours:
+            results = summarise([judge(row) for _, rows in ours for row in rows])
+            sections[name] = (results, [{**facts, 'cases': len(rows)} for facts, rows in ours])
+            click.echo(f'{pages.TITLES[name]}\n\n{pages.text_of(results)}', nl=False)
+    if page is None:
+        return
     drawable = find_spec('matplotlib') is not None
-    for path in [folders.root / 'results.md', *([page] if page else [])]:
-        pages.write_text(path, pages.page_of(results))
-        if drawable:
-            draw(results, path.parent / 'pictures')
-    click.echo(pages.text_of(results), nl=False)
-    if not drawable:
+    kept = list(sources)
+    if not kept:
+        for _, facts, rows in trials:
+            kept.append(page.with_name(f'{page.stem}_{facts["set"]}.jsonl'))
+            outcomes.write(kept[-1], facts, rows)
+    shown = [str(path.relative_to(page.parent.parent)) if path.is_relative_to(page.parent.parent)
+             else path.name for path in (one.resolve() for one in kept)] \
+        if (page := page.resolve()) else []
+    pages.write_text(page, pages.page_of(sections, shown, drawable))
+    if drawable:
+        draw(next(iter(sections.values()))[0], page.parent / 'pictures')
+    else:
         click.echo("no pictures: pip install 'lg_husky_sim[plot]'", err=True)
-    click.echo(f'details: {folders.root / "results.md"}')
+    click.echo(f'page: {page}')

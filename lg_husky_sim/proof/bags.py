@@ -43,6 +43,12 @@ class Published:
         The commands carry a stamp (TwistStamped).
     suffix
         Ending of the wheel joints' names.
+    velocities, positions
+        Whether JointState has them.
+    order
+        Order of the wheels in JointState.
+
+    A stream without rows is not in the bag.
 
     """
 
@@ -52,6 +58,9 @@ class Published:
     poses: Vector
     stamped: bool = True
     suffix: str = ''
+    velocities: bool = True
+    positions: bool = True
+    order: tuple[int, ...] = (0, 1, 2, 3)
 
 
 @cache
@@ -108,12 +117,14 @@ def write_bag(path: Path, data: Published, start_ns: int) -> None:
             message = types['geometry_msgs/msg/TwistStamped'](
                 header=header(stamp=time, frame_id='base_link'), twist=message)
         rows.append((stamp, COMMAND, message))
-    names = [wheel + data.suffix for wheel in WHEELS]
+    names = [WHEELS[k] + data.suffix for k in data.order]
+    order = np.array(data.order)
     for row in data.joints:
         time, stamp = _stamp(float(row[0]), start_ns)
         rows.append((stamp, '/joint_states', types['sensor_msgs/msg/JointState'](
             header=header(stamp=time, frame_id=''), name=names,
-            position=row[1:5].copy(), velocity=row[5:9].copy(), effort=np.zeros(0))))
+            position=row[1 + order] if data.positions else np.zeros(0),
+            velocity=row[5 + order] if data.velocities else np.zeros(0), effort=np.zeros(0))))
     none = np.zeros(9)
     none[0] = -1.0
     for row in data.imu:
@@ -158,7 +169,8 @@ def _rename_inside(draft: Path, name: str) -> None:
     old = f'{draft.name}.mcap'
     os.replace(draft / old, draft / f'{name}.mcap')
     metadata = draft / 'metadata.yaml'
-    metadata.write_text(metadata.read_text().replace(old, f'{name}.mcap'))
+    text = metadata.read_text(encoding='utf-8').replace(old, f'{name}.mcap')
+    metadata.write_text(text, encoding='utf-8')
 
 
 def _seconds(stamp: Any) -> int:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 import hashlib
 import math
@@ -12,26 +12,36 @@ from pathlib import Path
 from typing import Any
 
 from lg_husky_sim.errors import CommandError
-from lg_husky_sim.proof import catalogue, effects, manoeuvres, robots, sensors, world
-from lg_husky_sim.proof.bags import write_bag
-from lg_husky_sim.proof.hidden import Change, Setting
-from lg_husky_sim.proof.integrate import COLUMNS, Gate, integrate
-from lg_husky_sim.proof.motion import (
-    demand_of,
-    gates,
-    Hidden,
-    LEAST_TRACE,
-    Pose,
-    run,
-    visibility,
+from lg_husky_sim.proof import (
+    catalogue,
+    conventions,
+    effects,
+    manoeuvres,
+    oracle,
+    robots,
+    sensors,
+    world,
 )
-from lg_husky_sim.proof.sealing import seal
+from lg_husky_sim.proof.bags import write_bag
+from lg_husky_sim.proof.commands import send, Sent
+from lg_husky_sim.proof.conventions import Conventions
+from lg_husky_sim.proof.hidden import Change, Rng, Setting, size_of
+from lg_husky_sim.proof.integrate import COLUMNS
+from lg_husky_sim.proof.motion import alone, gates, Hidden, Pose, run
+from lg_husky_sim.proof.sealing import plain, seal
+from lg_husky_sim.proof.settings import settings
 import numpy as np
 
 KINDS = ('clean', 'single', 'pair', 'outside')
-WORLDS = ('g1', 'g2', 'g3')
+WORLDS = ('g1', 'g2', 'g3', 'g4')
+WORLD_TITLES = {'g1': 'open loop, fine steps', 'g2': 'MuJoCo',
+                'g3': 'four tyres, speed loop', 'g4': 'Bullet'}
+ENGINES = ('g2', 'g4')
+DATE = 1_700_000_000
+"""One date [s] for all: it says nothing of the seed, from which an answer could be made again."""
+HELD_OUT_DATE = 1_700_090_000 * 10 ** 9
 _ROBOTS = {'g1': robots.open_loop_robot, 'g2': robots.engine_robot,
-           'g3': robots.closed_loop_robot}
+           'g3': robots.closed_loop_robot, 'g4': robots.engine_robot}
 
 
 class NoTraceError(Exception):
@@ -50,31 +60,44 @@ class Spec:
     kind
         'clean', 'single', 'pair' or 'outside'.
     world
-        'g1' (open-loop, fine-step), 'g2' (rigid-body engine) or 'g3' (brush tyres and
-        speed loop); 'g2' and 'g3' come with baseline recordings.
+        'g1' (open-loop, fine-step), 'g2' (MuJoCo), 'g3' (four tyres and a speed loop) or
+        'g4' (Bullet); all but the first come with baseline recordings.
     drive
-        'paper', 'full' or 'drive-like'.
+        One of `manoeuvres.SETS`.
     effects
         Names; empty: drawn.
     severity
         'weak', 'medium', 'strong'; empty: drawn.
     onset
         'none', 'time' or 'place'; empty: drawn.
+    tuning
+        Leave out the families that tuning may not see.
+    floor, wheels
+        Level of roughness and kind of wheel speeds; empty: drawn.
+    seconds
+        Shortest and longest recording [s].
+    complete
+        No sensor is missing.
 
     """
 
     seed: int
     kind: str = 'single'
     world: str = 'g1'
-    drive: str = 'paper'
+    drive: str = 'full'
     effects: tuple[str, ...] = ()
     severity: str = ''
     onset: str = ''
+    tuning: bool = True
+    floor: str = ''
+    wheels: str = ''
+    seconds: tuple[float, float] = (40.0, 60.0)
+    complete: bool = False
 
     def __post_init__(self) -> None:
         for name, value, allowed in (
                 ('kind', self.kind, KINDS), ('world', self.world, WORLDS),
-                ('drive', self.drive, manoeuvres.SETS),
+                ('drive', self.drive, tuple(manoeuvres.SETS)),
                 ('severity', self.severity, ('', *catalogue.SEVERITIES)),
                 ('onset', self.onset, ('', 'none', 'time', 'place'))):
             if value not in allowed:
@@ -87,7 +110,7 @@ def _others(first: str, names: list[str]) -> list[str]:
     return [name for name in names if catalogue.subsystem(name) != same]
 
 
-def choose(spec: Spec, rng: np.random.Generator) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def choose(spec: Spec, rng: Rng) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the names and severities of the effects of a case."""
     names = sorted(catalogue.SUBSYSTEM)
     names = [name for name in names if name not in catalogue.absent_from(spec.world)]
@@ -111,9 +134,9 @@ def choose(spec: Spec, rng: np.random.Generator) -> tuple[tuple[str, ...], tuple
     return chosen, severity
 
 
-def _onset(spec: Spec, chosen: tuple[str, ...], rng: np.random.Generator) -> str:
+def _onset(spec: Spec, chosen: tuple[str, ...], rng: Rng) -> str:
     draw = float(rng.random())
-    if not chosen or len(chosen) > 1 or spec.world == 'g2':
+    if not chosen or len(chosen) > 1 or spec.world != 'g1':
         return 'none'
     name = chosen[0]
     if spec.onset:
@@ -127,103 +150,63 @@ def _onset(spec: Spec, chosen: tuple[str, ...], rng: np.random.Generator) -> str
     return 'time' if draw > 0.8 else 'none'
 
 
-def _setting(robot: robots.Robot, fields: Mapping[str, float],
-             drives: tuple[manoeuvres.Manoeuvre, ...], level: int,
-             heavy: bool) -> Setting:
-    commands = np.concatenate([drive.commands for drive in drives])
-    volts = world.NOMINAL_SUPPLY * robot.command.gain * (
-        np.abs(commands[:, 0]) + world.TURN_RATIO * np.abs(commands[:, 1]))
-    loads = [_load(robot, drive) for drive in drives]
-    steepest = max(float((np.abs(np.diff(drive.commands, axis=0)).max(axis=1)
-                          / np.diff(drive.times)).max()) for drive in drives)
+def _setting(name: str, severity: str, hidden: Hidden, case: oracle.Drives,
+             tuning: bool, rng: Rng) -> Setting:
+    commands = np.concatenate([drive.commands for drive in case.drives])
+    fields = hidden.fields
+    volts = fields['supply'] * fields['command_gain'] * (
+        np.abs(commands[:, 0]) + fields['turn_ratio'] * np.abs(commands[:, 1]))
+    steepest = max(float(np.abs(np.diff(drive.commands, axis=0)).max())
+                   for drive in case.drives) * case.how.link.rate
+    squares, peaks = [10.0], []
+    for k, drive in enumerate(case.drives):
+        table = run(alone(hidden), drive, case.sent[k], case.how, case.poses[k], None,
+                    step=oracle.step_of(hidden))
+        currents = table[:, COLUMNS.index('current_left'):COLUMNS.index('current_right') + 1]
+        squares.append(float((currents ** 2).sum(axis=0).max() * (table[1, 0] - table[0, 0])))
+        peaks.append(float(np.abs(currents).max()))
     return Setting(
-        fields, float(np.abs(commands[:, 0]).max()), float(np.abs(commands[:, 1]).max()),
-        float(min(volts.max(), world.NOMINAL_SUPPLY)), level, steepest,
-        max(max(load[0] for load in loads), 10.0), max(load[1] for load in loads),
-        heavy)
+        fields, size_of(name, catalogue.SEVERITIES.index(severity), rng),
+        float(np.abs(commands[:, 0]).max()), float(np.abs(commands[:, 1]).max()),
+        float(min(volts.max(), fields['supply'])), min(steepest, 20.0), max(squares), max(peaks),
+        max(drive.duration for drive in case.drives), case.how.streams,
+        conventions.left_out('forms', tuning))
 
 
-def _load(robot: robots.Robot, drive: manoeuvres.Manoeuvre) -> tuple[float, float]:
-    """Return the integral of i² [A²·s] and the largest |i| [A] without any effect."""
-    vector = world.vector(robot.fields)
-    table = integrate(vector, vector, Gate(), demand_of(robot.fields, robot.command, drive, None),
-                      np.zeros((2, 5)))
-    currents = table[:, COLUMNS.index('current_left'):COLUMNS.index('current_right') + 1]
-    period = float(table[1, 0] - table[0, 0])
-    return float((currents ** 2).sum(axis=0).max() * period), float(np.abs(currents).max())
-
-
-def conceal(spec: Spec, robot: robots.Robot, drives: tuple[manoeuvres.Manoeuvre, ...],
-            rng: np.random.Generator) -> tuple[Hidden, list[dict[str, Any]], list[Change]]:
+def conceal(spec: Spec, robot: robots.Robot, case: oracle.Drives, chosen: tuple[str, ...],
+            severities: tuple[str, ...],
+            rng: Rng) -> tuple[Hidden, list[dict[str, Any]], list[Change]]:
     """Return the robot with its effects, what the answer says of them, and their changes."""
-    names, severities = choose(spec, rng)
-    fields = dict(robot.fields)
-    command: dict[str, Any] = {}
-    senses: dict[str, Any] = {}
-    wind = 0.0
+    onset = _onset(spec, chosen, rng)
+    which = int(rng.integers(len(case.drives)))
+    drive = case.drives[which]
+    time = drive.moving_start + float(rng.uniform(0.3, 0.65)) * (
+        drive.duration - drive.moving_start)
+    hidden = Hidden(robot, robot.fields, robot.command, sensors.Faults(), 0.0, spec.world,
+                    onset, which, time, onset_width=float(rng.choice([0.02, 0.2, 0.5])),
+                    onset_sign=1.0 if rng.random() < 0.5 else -1.0)
     told, changes = [], []
-    for name, severity in zip(names, severities, strict=True):
-        level = catalogue.SEVERITIES.index(severity)
-        setting = _setting(robot, fields, drives, level, heavy=spec.world != 'g1')
+    for name, severity in zip(chosen, severities, strict=True):
+        setting = _setting(name, severity, hidden, case, spec.tuning, rng)
         change = effects.build(name, setting, rng)
         changes.append(change)
-        fields.update(change.fields)
-        command.update(_commanded(robot, fields, change))
-        senses.update(change.senses)
-        wind += change.gusts
-        told.append({'effect': name, 'severity': severity, 'side': change.side,
-                     'subsystem': catalogue.subsystem(name),
-                     'known': name in catalogue.SUBSYSTEM,
-                     'parameters': dict(change.parameters)})
-    onset = _onset(spec, names, rng)
-    which = int(rng.integers(len(drives)))
-    time = float(rng.uniform(0.3, 0.65)) * drives[which].duration
-    if onset == 'time':
-        command['since'] = time
-        senses['since'] = time
-    hidden = Hidden(robot, fields, replace(robot.command, **command),
-                    replace(robot.senses, **senses), wind, spec.world, onset, which, time)
+        hidden = with_change(hidden, change)
+        told.append(_told(name, severity, setting.size, change))
+    if onset == 'place':
+        hidden = replace(hidden, onset_x=_border(hidden, case))
     return hidden, told, changes
 
 
-def _commanded(robot: robots.Robot, fields: Mapping[str, float],
-               change: Change) -> Mapping[str, Any]:
-    if fields['loop'] < 0.5 or robot.fields['loop'] > 0.5:
-        return _added(robot.command, change.command)
-    return change.command
+def with_change(hidden: Hidden, change: Change) -> Hidden:
+    """Return a robot with one effect more."""
+    command: dict[str, Any] = _added(hidden.command, change.command)
+    faults: dict[str, Any] = dict(change.senses)
+    return replace(hidden, fields={**hidden.fields, **change.fields},
+                   command=replace(hidden.command, **command),
+                   faults=replace(hidden.faults, **faults), gusts=hidden.gusts + change.gusts)
 
 
-def alone(hidden: Hidden, change: Change) -> Hidden:
-    """Return the same robot with one of its effects only."""
-    robot = hidden.robot
-    fields = {**robot.fields, **change.fields}
-    command: dict[str, Any] = {**_commanded(robot, fields, change)}
-    senses: dict[str, Any] = {**change.senses}
-    return replace(hidden, fields=fields, command=replace(robot.command, **command),
-                   senses=replace(robot.senses, **senses), gusts=change.gusts)
-
-
-def check_traces(hidden: Hidden, changes: Sequence[Change],
-                 drives: tuple[manoeuvres.Manoeuvre, ...], poses: list[Pose]) -> None:
-    """
-    Refuse an effect that these drives cannot show: a weak reverse gear when none reverses.
-
-    Raises
-    ------
-    NoTraceError
-        An effect alone moves no channel by `LEAST_TRACE` of its noise. Faults of sensors and
-        wind, which move nothing by themselves, are not looked at.
-
-    """
-    for change in changes:
-        if change.senses or change.gusts > 0.0:
-            continue
-        seen = visibility(alone(hidden, change), drives, poses)
-        if max(seen.values()) < LEAST_TRACE:
-            raise NoTraceError(f'{dict(change.parameters)} leaves no trace: {seen}')
-
-
-def _added(path: sensors.CommandPath, change: Mapping[str, float]) -> dict[str, float]:
+def _added(path: Any, change: Mapping[str, float]) -> dict[str, Any]:
     """Combine a command effect with what the robot's command path does anyway."""
     result = dict(change)
     for name in ('latency', 'loop_lag'):
@@ -236,33 +219,86 @@ def _added(path: sensors.CommandPath, change: Mapping[str, float]) -> dict[str, 
     return result
 
 
-def _gaps(senses: sensors.Senses, duration: float,
-          rng: np.random.Generator) -> sensors.Senses:
-    gaps = [(float(rng.uniform(2.0, duration - 3.0)), float(rng.uniform(0.15, 0.45)))
-            for _ in range(int(rng.integers(0, 3)))]
-    if rng.random() < 0.1:
-        gaps.append((float(rng.uniform(5.0, duration - 5.0)), float(rng.uniform(0.6, 1.2))))
-    return replace(senses, gaps=tuple(gaps))
+def _told(name: str, severity: str, size: float, change: Change) -> dict[str, Any]:
+    numbers = settings()['effects'][name]
+    return {'effect': name, 'in_list': name in catalogue.SUBSYSTEM, 'severity': severity,
+            'size': size, 'unit': numbers['unit'], 'form': change.form,
+            'side': 'both' if change.side == 'none' else change.side,
+            'location': {'subsystem': catalogue.subsystem(name)},
+            'related_answers': list(numbers['related']),
+            'parameters': dict(change.parameters), 'onset': None}
 
 
-def _start_pose(rng: np.random.Generator, elsewhere: bool) -> Pose:
+def _border(hidden: Hidden, case: oracle.Drives) -> float:
+    """Put the border of another floor where the robot passes about half way."""
+    plain = alone(hidden)
+    tables = [run(plain, drive, case.sent[k], case.how, case.poses[k], None,
+                  step=oracle.step_of(plain)) for k, drive in enumerate(case.drives)]
+    return float(np.quantile(np.concatenate(
+        [table[:, COLUMNS.index('x')] for table in tables]), 0.5))
+
+
+def _onset_json(hidden: Hidden, case: oracle.Drives) -> dict[str, Any] | None:
+    if hidden.world != 'g1':
+        return {'type': 'set'}
+    if hidden.onset == 'time':
+        before = case.drives[hidden.onset_recording].moving_start
+        return {'type': 'time', 'recording': f'rec{hidden.onset_recording + 1}',
+                'seconds_after_epoch': round(hidden.onset_time - before, 3)}
+    if hidden.onset == 'place':
+        return {'type': 'place', 'x0': round(hidden.onset_x, 3), 'sign': hidden.onset_sign}
+    return None
+
+
+def _start_pose(rng: Rng, elsewhere: bool) -> Pose:
     draw = rng.uniform(-1.0, 1.0, 3)
     if not elsewhere:
         return (0.0, 0.0, 0.0)
     return (float(3.0 * draw[0]), float(3.0 * draw[1]), float(math.pi * draw[2]))
 
 
-def _place(hidden: Hidden, drives: tuple[manoeuvres.Manoeuvre, ...],
-           poses: list[Pose]) -> Hidden:
-    """Put the border of another floor where the robot passes about half way."""
-    tables = [run(hidden, drive, pose, None, None, with_effect=False)
-              for drive, pose in zip(drives, poses, strict=True)]
-    passed = np.concatenate([table[:, COLUMNS.index('x')] for table in tables])
-    return replace(hidden, onset_x=float(np.quantile(passed, 0.5)))
+def _drives(spec: Spec, how: Conventions, who: manoeuvres.Driver, rng: Rng,
+            count: int = 3) -> oracle.Drives:
+    """Draw one set of manoeuvres, and what becomes of their messages."""
+    drives = manoeuvres.drive(spec.drive, who, rng, conventions.left_out('drives', spec.tuning),
+                              count)
+    elsewhere = bool(rng.random() < 0.5)
+    sent: list[Sent] = [send(drive, how.link, how.jitter, rng) for drive in drives]
+    return oracle.Drives(drives, sent, [_start_pose(rng, elsewhere) for _ in drives], how)
+
+
+def _record(hidden: Hidden, case: oracle.Drives, folder: Path, clock: int, rng: Rng) -> int:
+    """Drive and write `rec1`, ...; return the time after the last [s since the epoch]."""
+    for index, drive in enumerate(case.drives):
+        ground = robots.floor(case.how.floor, drive.duration, rng)
+        table = run(hidden, drive, case.sent[index], case.how, case.poses[index], index, ground,
+                    rng)
+        faults = replace(hidden.faults, since=gates(hidden, index)[1])
+        published = sensors.publish(table, case.sent[index], case.how, faults,
+                                    drive.moving_start, hidden.robot.told_radius, rng)
+        write_bag(folder / f'rec{index + 1}', published, clock * 10 ** 9)
+        clock += int(drive.duration) + int(rng.integers(15, 200))
+    return clock
+
+
+def _hold_out(spec: Spec, hidden: Hidden, how: Conventions, who: manoeuvres.Driver, folder: Path,
+              rng: Rng) -> None:
+    """Write a fresh drive of the same robot, and what it would do without chance."""
+    who = replace(who, moving=0.0, longest=min(who.longest, 60.0),
+                  shortest=min(who.shortest, 40.0))
+    case = _drives(spec, how, who, rng, 1)
+    drive, sent = case.drives[0], case.sent[0]
+    ground = robots.floor(how.floor, drive.duration, rng)
+    table = run(hidden, drive, sent, how, case.poses[0], None, ground, rng)
+    radius = hidden.robot.told_radius
+    write_bag(folder / 'held1', sensors.publish(table, sent, how, hidden.faults, 0.0, radius, rng),
+              HELD_OUT_DATE)
+    truth = run(hidden, drive, sent, how, case.poses[0], None)
+    write_bag(folder / 'truth1', sensors.ideal(truth, sent, how, hidden.faults), HELD_OUT_DATE)
 
 
 def generate(spec: Spec, name: str, out_dir: Path, answers_dir: Path,
-             held_out_dir: Path) -> str:
+             held_out_dir: Path | None = None) -> str:
     """
     Make one concealed case and return the commitment to its answer.
 
@@ -273,13 +309,14 @@ def generate(spec: Spec, name: str, out_dir: Path, answers_dir: Path,
     name
         Name of the case, 'case_0001'.
     out_dir
-        Gets `<name>/recordings/rec1` and so on, and `<name>/baseline/base1` where the
-        question is what changed.
+        Gets `<name>/rec1` and so on, or `<name>/before/rec1` and `<name>/after/rec1`
+        where the question is what changed.
     answers_dir
         Gets `<name>.json`, sealed.
     held_out_dir
-        Gets `<name>/held1`, ... (fresh recordings of the same robot) and `<name>/truth1`,
-        ... (what the hidden robot would do without noise under the same commands).
+        Gets `<name>/held1` (a fresh recording of the same robot) and `<name>/truth1` (what it
+        would do without chance under the same commands), where the robot has all sensors
+        and no baseline. None: not made.
 
     Raises
     ------
@@ -289,63 +326,65 @@ def generate(spec: Spec, name: str, out_dir: Path, answers_dir: Path,
         The robot leaves its physical bounds.
 
     """
-    rng = np.random.default_rng([spec.seed, WORLDS.index(spec.world),
-                                 KINDS.index(spec.kind)])
+    rng = np.random.default_rng([spec.seed, WORLDS.index(spec.world), KINDS.index(spec.kind)])
     robot = _ROBOTS[spec.world](rng)
-    drives = manoeuvres.drive(spec.drive, rng)
-    hidden, told, changes = conceal(spec, robot, drives, rng)
-    elsewhere = bool(rng.random() < 0.5)
-    poses = [_start_pose(rng, elsewhere) for _ in drives]
-    if hidden.onset == 'place':
-        hidden = _place(hidden, drives, poses)
-    check_traces(hidden, changes, drives, poses)
-    # One date for all: it says nothing of the seed, from which the answer could be made again.
-    clock = 1_700_000_000
-    for index, (drive, pose) in enumerate(zip(drives, poses, strict=True)):
-        table = run(hidden, drive, pose, index, rng)
-        senses = _gaps(replace(hidden.senses, since=gates(hidden, index)[1]),
-                       drive.duration, rng)
-        write_bag(out_dir / name / 'recordings' / f'rec{index + 1}',
-                  sensors.publish(table, drive, senses, rng), clock * 10 ** 9)
-        clock += int(drive.duration) + 15
-    if spec.world != 'g1':
-        for index, drive in enumerate(manoeuvres.again(spec.drive, drives, rng)):
-            table = run(hidden, drive, poses[0], None, rng, with_effect=False)
-            write_bag(out_dir / name / 'baseline' / f'base{index + 1}',
-                      sensors.publish(table, drive, _gaps(robot.senses, drive.duration, rng),
-                                      rng), (clock - 90_000) * 10 ** 9)
-            clock += int(drive.duration) + 15
-    for index, drive in enumerate(manoeuvres.held_out(spec.drive, drives, rng)):
-        table = run(hidden, drive, poses[0], None, rng)
-        senses = replace(hidden.senses, since=-1.0)
-        write_bag(held_out_dir / name / f'held{index + 1}',
-                  sensors.publish(table, drive, senses, rng), clock * 10 ** 9)
-        truth = sensors.ideal(run(hidden, drive, poses[0], None, None), drive, senses)
-        write_bag(held_out_dir / name / f'truth{index + 1}', truth, clock * 10 ** 9)
-        clock += int(drive.duration) + 15
-    salt = hashlib.sha256(rng.bytes(32)).hexdigest()
+    chosen, severities = choose(spec, rng)
+    needed = frozenset(conventions.STREAMS) if spec.complete else catalogue.needs(chosen)
+    how = conventions.draw(rng, spec.tuning, needed, spec.floor, spec.wheels)
+    who = manoeuvres.driver(rng, how.link.rate, spec.seconds,
+                            float(settings()['conventions']['moving_start']))
+    case = _drives(spec, how, who, rng)
+    hidden, told, changes = conceal(spec, robot, case, chosen, severities, rng)
+    worth = [_worth(replace(with_change(alone(hidden), change), onset=hidden.onset), case, spec)
+             for change in changes]
+    if worth and min(worth) < float(settings()['oracle']['no_trace']):
+        raise NoTraceError(f'{[t["effect"] for t in told]} leave no trace: {worth} nats')
+    clock = DATE
+    if spec.world == 'g1':
+        _record(hidden, case, out_dir / name, clock, rng)
+    else:
+        before = _drives(spec, how, who, rng)
+        _record(alone(hidden), before, out_dir / name / 'before', clock, rng)
+        _record(hidden, case, out_dir / name / 'after', clock + 90_000, rng)
+    if held_out_dir is not None and spec.world == 'g1' and not how.missing \
+            and how.wheels.kind != 'positions':
+        _hold_out(spec, hidden, how, who, held_out_dir / name, rng)
+    for item in told:
+        item['onset'] = _onset_json(hidden, case)
+    nominal = world.nominal()
+    kind = {'clean': 'none'}.get(spec.kind, spec.kind) if spec.world == 'g1' else 'before_after'
     answer = {
-        'case': name, 'salt': salt, 'spec': asdict(spec), 'effects': told,
-        'onset': {'kind': hidden.onset,
-                  'recording': f'rec{hidden.onset_recording + 1}'
-                  if hidden.onset == 'time' else None,
-                  'time_s': hidden.onset_time if hidden.onset == 'time' else None,
-                  'x_m': hidden.onset_x if hidden.onset == 'place' else None},
-        'visibility': visibility(hidden, drives, poses) if told else {},
-        'robot': {key: value for key, value in hidden.fields.items()
-                  if value != world.nominal()[key]},
-        'command_path': asdict(hidden.command), 'senses': asdict(hidden.senses),
-        'floor': asdict(robot.floor), 'manoeuvres': [drive.name for drive in drives],
-    }
+        'kind': kind, 'name': ' + '.join(f'{t["effect"]}/{t["severity"]}' for t in told) or 'none',
+        'level': oracle.level(min(worth)) if worth else 'clean', 'nats': worth,
+        'world': WORLD_TITLES[spec.world], 'unseen': unseen(spec, case, told),
+        'robot': {'wheel_radius_m': robot.told_radius, 'track_m': robot.told_track},
+        'answers': told, 'regime': dict(how.regime), 'conventions': how.as_json(),
+        'true_parameters': {key: value for key, value in hidden.fields.items()
+                            if value != nominal[key]},
+        'command_path': asdict(hidden.command), 'faults': asdict(hidden.faults),
+        'recordings': [{'name': f'rec{k + 1}', 'manoeuvre': drive.name,
+                        'seconds': drive.duration - drive.moving_start,
+                        'moving_start': drive.moving_start, 'start_pose': case.poses[k]}
+                       for k, drive in enumerate(case.drives)],
+        'spec': asdict(spec), 'case': name, 'salt': hashlib.sha256(rng.bytes(32)).hexdigest()}
     return seal(answers_dir / f'{name}.json', plain(answer))
 
 
-def plain(value: Any) -> Any:
-    """Return JSON's own types, with infinities as text."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    return value
+def unseen(spec: Spec, case: oracle.Drives, told: list[dict[str, Any]]) -> list[str]:
+    """Return the families of a case that tuning never has."""
+    regime = case.how.regime
+    present = {
+        'floor': {regime['colour']}, 'wheels': {regime['wheels']}, 'stamps': {regime['stamps']},
+        'jitter': {regime['jitter form']}, 'base': {regime['base']},
+        'drives': {drive.name for drive in case.drives},
+        'forms': {f'{item["effect"]} {item["form"]}' for item in told}, 'worlds': {spec.world}}
+    return sorted(f'{axis}: {name}' for axis, names in present.items()
+                  for name in names & conventions.left_out(axis, tuning=True))
+
+
+def _worth(hidden: Hidden, case: oracle.Drives, spec: Spec) -> float:
+    """Return nats of an effect; in worlds with a baseline, against the same robot before."""
+    if spec.world in ENGINES:
+        # Engines are slow, and effects there are medium or strong.
+        return math.inf
+    return oracle.nats(hidden, case, np.random.default_rng([spec.seed, 5]))

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 SUBSYSTEM: Mapping[str, str] = {
     'battery_sag': 'electrical', 'battery_droop': 'electrical',
@@ -48,9 +48,17 @@ _WITHOUT_ENGINE = frozenset({
     'wheel_eccentricity'})
 
 
+def needs(effects: Iterable[str]) -> frozenset[str]:
+    """Return the streams without which effects cannot be seen at all."""
+    streams = {'gyro_bias': 'imu', 'gyro_scale': 'imu', 'gyro_sign': 'imu',
+               'gyro_clipping': 'imu', 'encoder_scale': 'wheels'}
+    return frozenset(streams[name] for name in effects if name in streams)
+
+
 def absent_from(world: str) -> frozenset[str]:
     """Return the effects that a world cannot hide."""
-    return {'g2': _WITHOUT_ENGINE, 'g3': _HIDDEN_BY_LOOP}.get(world, frozenset())
+    return {'g2': _WITHOUT_ENGINE, 'g4': _WITHOUT_ENGINE, 'g3': _HIDDEN_BY_LOOP}.get(
+        world, frozenset())
 
 
 def subsystem(effect: str) -> str:

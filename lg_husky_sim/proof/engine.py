@@ -1,114 +1,83 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The Husky in a rigid-body engine: MuJoCo, four ellipsoid tyres with dry contact on a plane.
+The Husky in other people's rigid-body engines: motors and drivers here, contact there.
 
 Nothing of the paper's model is in it: no creep, no yaw damping. Sliding, load transfer
-and chatter come from the contact solver. Sizes and masses are Clearpath's public ones.
+and chatter come from the engine's own contact solver.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Protocol
 
-from lg_husky_sim.errors import MissingExtraError
 from lg_husky_sim.proof import world as w
-from lg_husky_sim.proof.dynamics import chopper
-from lg_husky_sim.proof.integrate import COLUMNS, Gate, ROUGH_PERIOD, STEP
+from lg_husky_sim.proof.integrate import COLUMNS, Floor, Gate, ROUGH_PERIOD, ROW_PERIOD
+from lg_husky_sim.proof.laws import brought_down, chopper, dry, limited, shaft_loss
 import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 
-PERIOD = 2e-3
 SETTLING = 0.6
-_EVERY = round(PERIOD / STEP)
-_WHEEL_MASS = 2.6
-_WHEEL_WIDTH = 0.1143
-_NAMES = ('rear_left', 'rear_right', 'front_left', 'front_right')
+WHEEL_MASS = 2.6
+WHEEL_NAMES = ('rear_left', 'rear_right', 'front_left', 'front_right')
 
 
-def _model_text(p: Vector) -> str:
-    """Return the MJCF of a robot; wheels of a side turn together (its belt is stiff)."""
-    body_mass = p[w.MASS] - 4.0 * _WHEEL_MASS
-    wheel_yaw = 4.0 * _WHEEL_MASS * (p[w.HALF_TRACK] ** 2 + p[w.HALF_BASE] ** 2)
-    yaw_inertia = max(p[w.YAW_INERTIA] - wheel_yaw, 0.4)
-    gear = p[w.TORQUE_CONSTANT] / p[w.RESISTANCE]
-    brake = p[w.TORQUE_CONSTANT] * gear
-    wheels = []
-    for k, name in enumerate(_NAMES):
-        left = k % 2 == 0
-        radius = p[w.RADIUS_LEFT] if left else p[w.RADIUS_RIGHT]
-        friction = 0.5 * (p[w.FRICTION_LEFT] if left else p[w.FRICTION_RIGHT])
-        viscous = 0.5 * (p[w.VISCOUS_LEFT] if left else p[w.VISCOUS_RIGHT])
-        x = math.copysign(p[w.HALF_BASE], k - 1.5)
-        y = p[w.HALF_TRACK] if left else -p[w.HALF_TRACK]
-        wheels.append(f"""
-      <body name="{name}" pos="{x} {y} 0">
-        <joint name="{name}" type="hinge" axis="0 1 0" armature="{0.5 * p[w.INERTIA_MOTOR]}"
-               frictionloss="{friction}" damping="{viscous}"/>
-        <geom name="{name}" type="ellipsoid" size="{radius} {radius} {0.5 * _WHEEL_WIDTH}"
-              zaxis="0 1 0" mass="{_WHEEL_MASS}"/>
-      </body>""")
-    text = ''.join(wheels)
-    height = max(p[w.RADIUS_LEFT], p[w.RADIUS_RIGHT])
-    return f"""
-<mujoco model="hidden_robot">
-  <option timestep="{PERIOD}" integrator="implicitfast" cone="elliptic" impratio="1"/>
-  <default><geom friction="{p[w.TYRE_FRICTION]} 0.01 0.002" condim="3"
-    solref="0.045 1" solimp="0.7 0.95 0.005"/></default>
-  <worldbody>
-    <geom name="floor" type="plane" size="100 100 1"/>
-    <body name="base" pos="0 0 {height}">
-      <freejoint name="base"/>
-      <inertial pos="{p[w.CENTRE_FORWARD]} 0 0.06" mass="{body_mass}"
-                diaginertia="{0.4 * yaw_inertia} {0.8 * yaw_inertia} {yaw_inertia}"/>
-      {text}
-    </body>
-  </worldbody>
-  <equality>
-    <joint joint1="front_left" joint2="rear_left" solref="0.004 1"/>
-    <joint joint1="front_right" joint2="rear_right" solref="0.004 1"/>
-  </equality>
-  <actuator>
-    <general name="left" joint="rear_left" gainprm="{gear}" biastype="affine"
-             biasprm="0 0 {-brake}"/>
-    <general name="right" joint="rear_right" gainprm="{gear}" biastype="affine"
-             biasprm="0 0 {-brake}"/>
-  </actuator>
-</mujoco>"""
+@dataclass(frozen=True)
+class BodyState:
+    """Place [m, rad], velocity along the world [m/s, rad/s], driven axles [rad, rad/s]."""
+
+    x: float
+    y: float
+    heading: float
+    vx: float
+    vy: float
+    yaw: float
+    angles: tuple[float, float]
+    rates: tuple[float, float]
 
 
-def _engine() -> Any:
-    try:
-        import mujoco
-    except ImportError as error:
-        message = "world 'g2' needs MuJoCo: pip install 'lg_husky_sim[engine]'"
-        raise MissingExtraError(message) from error
-    return mujoco
+class Body(Protocol):
+    """A robot in an engine, in steps of `ROW_PERIOD`."""
+
+    def state(self) -> BodyState:
+        """Return where it is and how it moves."""
+
+    def advance(self, torques: tuple[float, float], force: tuple[float, float], moment: float,
+                gravity: tuple[float, float], friction: float) -> None:
+        """Take one step with torques on the driven axles and forces along the world."""
 
 
-def _open(gate: Gate, time: float, x: float) -> float:
+def _opening(gate: Gate, time: float, x: float) -> float:
     if gate.kind == 'none':
         return 1.0
-    z = ((time if gate.kind == 'time' else x) - gate.at) / gate.width
+    z = ((time if gate.kind == 'time' else x) - gate.at) / gate.width * gate.sign
     return min(max(z + 0.5, 0.0), 1.0)
 
 
-def _step_forces(p: Vector, forward: float, yaw: float, heading: float, position: Any,
-                 floor: Vector) -> tuple[float, float, float]:
+def _outer_forces(p: Vector, forward: float, yaw: float, place: BodyState,
+                  floor: Vector) -> tuple[float, float, float]:
     """Return force ahead and to the left [N] and moment [N·m] of what the engine lacks."""
-    direction = math.tanh(forward / 0.02)
-    ahead = floor[2] - p[w.ROLLING] * direction - p[w.DRAG] * abs(forward) * forward
+    moving = forward * forward + (p[w.HALF_TRACK] * yaw) ** 2
+    felt = 1.0 - math.exp(-moving / p[w.ROUGH_SPEED] ** 2)
+    form = max(p[w.FORM_DRY], 1.0)
+    ahead = felt * floor[2] - p[w.ROLLING] * dry(forward, 0.0, form)
+    ahead -= math.copysign(p[w.DRAG] * abs(forward) ** p[w.DRAG_EXPONENT], forward)
     wave = 2.0 * math.pi / p[w.UNDULATION_PITCH]
-    ahead += p[w.UNDULATION] * (math.cos(heading) * math.sin(wave * position[0])
-                                + math.sin(heading) * math.sin(wave * position[1]))
-    moment = floor[4] - p[w.SCRUB] * math.tanh(yaw / 0.02)
+    ahead += p[w.UNDULATION] * (math.cos(place.heading) * math.sin(wave * place.x)
+                                + math.sin(place.heading) * math.sin(wave * place.y))
+    moment = felt * floor[4] - p[w.SCRUB] * dry(yaw, 0.0, form)
     moment -= p[w.SCRUB_SPEED] * abs(forward) ** p[w.SCRUB_EXPONENT] * yaw
-    rolling = forward * forward + (p[w.HALF_TRACK] * yaw) ** 2
-    moment += p[w.PULL] * (1.0 - math.exp(-rolling / 0.03 ** 2))
-    return ahead, floor[3], moment
+    moment += p[w.PULL] * (1.0 - math.exp(-moving / p[w.PULL_SPEED] ** 2))
+    for soft, arm in ((p[w.ROLLING_LEFT], p[w.HALF_TRACK]),
+                      (p[w.ROLLING_RIGHT], -p[w.HALF_TRACK])):
+        pull = soft * math.tanh((forward - arm * yaw) / 0.02)
+        ahead -= pull
+        moment += arm * pull
+    return ahead, felt * floor[3], moment
 
 
 def _bus(p: Vector, time: float, duties: list[float], back: list[float]) -> float:
@@ -118,7 +87,7 @@ def _bus(p: Vector, time: float, duties: list[float], back: list[float]) -> floa
     With the current of the step before, a source that resists more than the windings would swing
     up from step to step.
     """
-    emf = p[w.EMF] * (1.0 - p[w.DROOP_DEPTH] * (1.0 - math.exp(-time / p[w.DROOP_TIME])))
+    emf = p[w.SUPPLY] * (1.0 - brought_down(time, 4.0 * time, p))
     source = p[w.BATTERY_RESISTANCE] + p[w.POLARISATION]
     share = source / p[w.RESISTANCE]
     bus = (emf + share * sum(d * b for d, b in zip(duties, back, strict=True))) / (
@@ -131,92 +100,112 @@ def _bus(p: Vector, time: float, duties: list[float], back: list[float]) -> floa
     return float(bus)
 
 
-def integrate_engine(off: Vector, on: Vector, gate: Gate, demand: Vector, rough: Vector,
-                     pose: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Vector:
+def _motors(p: Vector, time: float, volts: Vector, now: BodyState,
+            floor: Vector) -> tuple[list[float], list[float], float]:
+    """Return torques of both drives [N·m], currents [A] and the bus [V]."""
+    duties = [chopper(float(value), p) for value in volts]
+    back = [p[w.TORQUE_CONSTANT] * rate for rate in now.rates]
+    bus = _bus(p, time, duties, back)
+    torques, currents = [], []
+    for side in range(2):
+        asked = duties[side] * bus
+        if p[w.CURRENT_LIMIT] > 0.0:
+            asked = limited(asked, back[side], p[w.RESISTANCE] * p[w.CURRENT_LIMIT],
+                            p[w.FORM_CURRENT])
+        current = (asked - back[side]) / p[w.RESISTANCE]
+        rate = now.rates[side]
+        ripple = p[w.RIPPLE_LEFT + side]
+        turn = now.angles[side] + p[w.RIPPLE_PHASE] * (1.0 + side)
+        loss = shaft_loss(rate, math.tanh(rate / 0.03), p[w.FRICTION_LEFT + side],
+                          p[w.VISCOUS_LEFT + side], p)
+        torques.append(p[w.TORQUE_CONSTANT] * current - loss + floor[side]
+                       * math.tanh(abs(rate) / 0.3)
+                       + ripple * math.tanh(abs(rate) / 0.1) * (
+                           math.sin(turn) + p[w.RIPPLE_SECOND] * math.sin(2.0 * turn + 1.0)))
+        currents.append(current)
+    return torques, currents, bus
+
+
+def _floor_at(floor: Floor, time: float, place: BodyState) -> Vector:
+    felt = floor.rough[min(int(time / ROUGH_PERIOD), floor.rough.shape[0] - 1)].copy()
+    for kx, ky, phase, force, moment, left, right in floor.waves:
+        felt += math.sin(kx * place.x + ky * place.y + phase) * np.array(
+            [left, right, force, 0.0, moment])
+    return np.asarray(felt)
+
+
+def drive_body(body: Body, off: Vector, on: Vector, gate: Gate, arrivals: Vector, demand: Vector,
+               floor: Floor, seconds: float, heading: float) -> Vector:
     """
-    Return what a robot in the engine does; arguments and result as `integrate.integrate`.
+    Drive a robot of an engine; arguments and result as `integrate.integrate`.
 
-    The demand must be voltages. Belt, free play, heating, cogging and run-out have no
-    counterpart here.
-
-    Raises
-    ------
-    MissingExtraError
-        MuJoCo is not installed.
-    FloatingPointError
-        The motion left every physical bound.
-
+    `heading` [rad] is that of the start, from which turns are counted.
     """
-    mujoco = _engine()
-    model = mujoco.MjModel.from_xml_string(_model_text(on))
-    data = mujoco.MjData(model)
-    data.qpos[0:2] = pose[0:2]
-    data.qpos[3:7] = [math.cos(0.5 * pose[2]), 0.0, 0.0, math.sin(0.5 * pose[2])]
-    joints = [model.joint(name) for name in _NAMES[:2]]
-    angles = [int(joint.qposadr[0]) for joint in joints]
-    rates = [int(joint.dofadr[0]) for joint in joints]
-    for _ in range(round(SETTLING / PERIOD)):
-        mujoco.mj_step(model, data)
-    start_angles = [float(data.qpos[k]) for k in angles]
-    volts_asked = demand[::_EVERY]
-    per_rough = round(ROUGH_PERIOD / PERIOD)
-    table = np.zeros((volts_asked.shape[0], len(COLUMNS)))
-    turns = 0.0
-    last = pose[2]
-    frictions = model.geom_friction[:, 0].copy()
-    base_force = data.xfrc_applied[model.body('base').id]
-    wheel_weight = 0.25 * on[w.MASS] * w.GRAVITY
-    p = on
+    table = np.zeros((math.ceil(seconds / ROW_PERIOD), len(COLUMNS)))
+    start = body.state()
+    turned, last, p = heading, start.heading, on
+    coming, volts = 0, np.zeros(2)
+    before = start
     for row in range(table.shape[0]):
-        time = row * PERIOD
-        raw = _heading(data.qpos[3:7])
-        turns += math.remainder(raw - last, 2.0 * math.pi)
-        last = raw
-        heading = pose[2] + turns
-        cosine, sine = math.cos(heading), math.sin(heading)
+        time = row * ROW_PERIOD
+        while coming < arrivals.size and arrivals[coming] <= time:
+            volts = demand[coming]
+            coming += 1
+        now = body.state()
+        turned += math.remainder(now.heading - last, 2.0 * math.pi)
+        last = now.heading
+        cosine, sine = math.cos(turned), math.sin(turned)
         if gate.kind != 'none':
-            p = off + _open(gate, time, float(data.qpos[0])) * (on - off)
-        model.geom_friction[:, 0] = min(p[w.TYRE_FRICTION], p[w.FORCE_LIMIT] / wheel_weight) \
-            * frictions / on[w.TYRE_FRICTION]
-        model.opt.gravity[:] = (p[w.GRAVITY_X], p[w.GRAVITY_Y], -w.GRAVITY)
-        velocity = data.qvel[0:2]
-        forward = float(velocity[0] * cosine + velocity[1] * sine)
-        lateral = float(-velocity[0] * sine + velocity[1] * cosine)
-        yaw = float(data.qvel[5])
-        floor = rough[min(row // per_rough, rough.shape[0] - 1)]
-        ahead, across, moment = _step_forces(p, forward, yaw, heading, data.qpos, floor)
-        base_force[:] = (ahead * cosine - across * sine, ahead * sine + across * cosine, 0.0,
-                         0.0, 0.0, moment)
-        duties = [chopper(float(volts), p) for volts in volts_asked[row]]
-        wheel = [float(data.qvel[k]) for k in rates]
-        currents = [float(torque) / p[w.TORQUE_CONSTANT] for torque in data.actuator_force]
-        bus = _bus(p, time, duties, [p[w.TORQUE_CONSTANT] * rate for rate in wheel])
-        for side in range(2):
-            volts = duties[side] * bus
-            back = p[w.TORQUE_CONSTANT] * wheel[side]
-            if p[w.CURRENT_LIMIT] > 0.0:
-                room = p[w.RESISTANCE] * p[w.CURRENT_LIMIT]
-                volts = min(max(volts, back - room), back + room)
-            data.ctrl[side] = volts
-            ripple = p[w.RIPPLE_LEFT + side]
-            turn = float(data.qpos[angles[side]]) + p[w.RIPPLE_PHASE] * (1.0 + side)
-            data.qfrc_applied[rates[side]] = floor[side] + ripple * (
-                math.tanh(abs(wheel[side]) / 0.1) * math.sin(turn))
-        mujoco.mj_step(model, data)
-        push = data.qacc[0:2] - model.opt.gravity[0:2]
+            p = off + _opening(gate, time, now.x) * (on - off)
+        forward = now.vx * cosine + now.vy * sine
+        felt = _floor_at(floor, time, now)
+        ahead, across, moment = _outer_forces(p, forward, now.yaw, now, felt)
+        torques, currents, bus = _motors(p, time, volts, now, felt)
+        force = (ahead * cosine - across * sine, ahead * sine + across * cosine)
+        gravity = (p[w.GRAVITY_X], p[w.GRAVITY_Y])
+        friction = p[w.TYRE_FRICTION]
+        if p[w.FORCE_LIMIT] < w.NEVER:
+            friction = min(friction, 4.0 * p[w.FORCE_LIMIT] / (p[w.MASS] * w.GRAVITY))
+        body.advance((torques[0], torques[1]), force, moment, gravity, friction)
+        push = ((now.vx - before.vx) / ROW_PERIOD - gravity[0],
+                (now.vy - before.vy) / ROW_PERIOD - gravity[1])
+        before = now
+        angles = [now.angles[k] - start.angles[k] for k in range(2)]
         table[row] = (
-            time, forward, lateral, yaw, float(data.qpos[0]), float(data.qpos[1]), heading,
-            wheel[0], wheel[1], float(data.qpos[angles[0]]) - start_angles[0],
-            float(data.qpos[angles[1]]) - start_angles[1], currents[0], currents[1],
-            float(push[0] * cosine + push[1] * sine),
-            float(-push[0] * sine + push[1] * cosine), bus,
-            float(data.ctrl[0]), float(data.ctrl[1]))
+            time, forward, -now.vx * sine + now.vy * cosine, now.yaw, now.x, now.y, turned,
+            *now.rates, *angles, *angles, *currents, push[0] * cosine + push[1] * sine,
+            -push[0] * sine + push[1] * cosine, bus)
     speeds = np.abs(table[:, [1, 7, 8]])
     if not np.isfinite(table).all() or np.any(speeds > (50.0, 500.0, 500.0)):
         raise FloatingPointError('the robot in the engine left its bounds')
     return table
 
 
-def _heading(quaternion: Any) -> float:
-    a, b, c, d = (float(part) for part in quaternion)
-    return math.atan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d))
+def integrate_engine(name: str, off: Vector, on: Vector, gate: Gate, arrivals: Vector,
+                     demand: Vector, floor: Floor, seconds: float,
+                     pose: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Vector:
+    """
+    Return what a robot does in an engine, from rest; as `integrate.integrate`.
+
+    Parameters
+    ----------
+    name
+        'mujoco' or 'bullet'.
+    off, on, gate, arrivals, demand, floor, seconds, pose
+        As `integrate.integrate`. Mass and radii are those of `on` all along.
+
+    Raises
+    ------
+    MissingExtraError
+        The engine is not installed.
+    FloatingPointError
+        The motion left every physical bound.
+
+    """
+    if name == 'mujoco':
+        from lg_husky_sim.proof.mujoco_body import MujocoBody
+        return drive_body(MujocoBody(on, pose), off, on, gate, arrivals, demand, floor, seconds,
+                          pose[2])
+    from lg_husky_sim.proof.bullet_body import BulletBody
+    with BulletBody(on, pose) as body:
+        return drive_body(body, off, on, gate, arrivals, demand, floor, seconds, pose[2])

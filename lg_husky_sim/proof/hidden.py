@@ -8,7 +8,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 import math
 
+from lg_husky_sim.proof.settings import settings
 import numpy as np
+
+Rng = np.random.Generator
 
 
 @dataclass(frozen=True)
@@ -20,29 +23,35 @@ class Setting:
     ----------
     fields
         The robot before this effect.
+    size
+        How strong, in the unit of `config/blind_trial.yaml` (effects).
     most_forward, most_yaw, most_volts
         Largest command [m/s], [rad/s] and voltage [V] of the manoeuvres.
-    level
-        0 weak, 1 medium, 2 strong.
     steepest
         Largest change of the command [m/s² or rad/s²].
     squared_current, peak_current
         Integral of i² over the longest manoeuvre, and largest |i|, without the effect, the
         larger of both sides [A²·s], [A].
-    heavy
-        The tyres have dry contact, so that turning takes several times the moment.
+    seconds
+        Length of the longest manoeuvre [s].
+    streams
+        Sensors that are recorded: of 'wheels', 'imu', 'pose'.
+    left_out
+        Forms of effects that may not be drawn, 'effect form'.
 
     """
 
     fields: Mapping[str, float]
+    size: float
     most_forward: float
     most_yaw: float
     most_volts: float
-    level: int
     steepest: float = 20.0
     squared_current: float = 400.0
     peak_current: float = 20.0
-    heavy: bool = False
+    seconds: float = 60.0
+    streams: tuple[str, ...] = ('wheels', 'imu', 'pose')
+    left_out: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -53,11 +62,13 @@ class Change:
     Attributes
     ----------
     fields, command, senses
-        New values of `world.FIELDS`, `CommandPath` and `Senses` entries.
+        New values of fields of the robot, `CommandPath` and `Faults` entries.
     side
         'left', 'right', 'both' or 'none'.
     parameters
         The true size, for the answer: name to value (SI).
+    form
+        The functional form, in words.
     gusts
         Force of the wind [N] (it is a disturbance, not a field).
 
@@ -68,17 +79,22 @@ class Change:
     senses: Mapping[str, float | str] = field(default_factory=dict)
     side: str = 'none'
     parameters: Mapping[str, float] = field(default_factory=dict)
+    form: str = ''
     gusts: float = 0.0
 
 
-Rng = np.random.Generator
 Builder = Callable[[Setting, Rng], Change]
 
 
-def draw(rng: Rng, s: Setting, *ranges: tuple[float, float]) -> float:
-    """Draw a size, even in its logarithm, from the range of the severity."""
-    low, high = ranges[s.level]
+def logarithmic(rng: Rng, low: float, high: float) -> float:
+    """Draw a number evenly in its logarithm."""
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+
+
+def size_of(effect: str, level: int, rng: Rng) -> float:
+    """Draw the size of an effect that is weak (0), medium (1) or strong (2)."""
+    low, high = settings()['effects'][effect]['sizes'][level]
+    return logarithmic(rng, float(low), float(high))
 
 
 def sign(rng: Rng) -> float:

@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Fine-step integration of a hidden robot: Runge-Kutta of fourth order, compiled."""
+"""Fine-step integration of a hidden robot: Runge-Kutta of fourth order, exact at commands."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 
-STEP = 0.5e-3
-STEPS_PER_ROW = 4
-ROUGH_PERIOD = 0.01
+STEP = 1e-4
+"""Largest step [s]; steps end where a command arrives and where a row is due."""
+COARSE = 2.5e-4
+"""Step of the simulations that only measure how much an effect shows [s]."""
+ROW_PERIOD = 1e-3
+ROUGH_PERIOD = 0.005
 
 COLUMNS = (
     'time', 'forward', 'lateral', 'yaw_rate', 'x', 'y', 'heading',
     'wheel_left', 'wheel_right', 'angle_left', 'angle_right',
-    'current_left', 'current_right', 'accel_x', 'accel_y', 'bus',
-    'volts_left', 'volts_right',
+    'motor_left', 'motor_right', 'current_left', 'current_right', 'accel_x', 'accel_y', 'bus',
 )
 
 
@@ -37,22 +39,42 @@ class Gate:
     kind
         'none' (always on), 'time' or 'place'.
     at
-        Seconds since the start of the recording, or metres of x in the odometry frame.
+        Seconds since the start, or metres of x in the odometry frame.
     width
         Seconds or metres over which it comes in.
+    sign
+        1: beyond `at`; -1: before it (places only).
 
     """
 
     kind: str = 'none'
     at: float = 0.0
     width: float = 0.2
+    sign: float = 1.0
+
+
+@dataclass(frozen=True)
+class Floor:
+    """
+    What the floor does to a robot, drawn.
+
+    `rough`: every `ROUGH_PERIOD`, shape (n, 5) (`dynamics.derivative`). `waves`: bound to
+    places, rows of wave numbers in x and y [rad/m], phase, and amplitudes of force [N],
+    moment, torque left and right [N·m].
+    """
+
+    rough: Vector
+    waves: Vector
+
+
+def smooth_floor() -> Floor:
+    """Return a floor that does nothing."""
+    return Floor(np.zeros((1, 5)), np.zeros((0, 7)))
 
 
 @compiled
-def _opening(kind: int, at: float, width: float, time: float, x: float) -> float:
-    if kind == 0:
-        return 1.0
-    z = ((time if kind == 1 else x) - at) / width
+def _opening(kind: int, at: float, width: float, sign: float, time: float, x: float) -> float:
+    z = ((time if kind == 1 else x) - at) / width * sign
     if z <= -0.5:
         return 0.0
     if z >= 0.5:
@@ -61,107 +83,127 @@ def _opening(kind: int, at: float, width: float, time: float, x: float) -> float
 
 
 @compiled
-def _mix(off: Vector, on: Vector, opening: float, p: Vector) -> None:
-    for k in range(p.size):
-        p[k] = off[k] + opening * (on[k] - off[k])
+def _control(s: Vector, goal: Vector, before: Vector, integral: Vector, volts: Vector,
+             p: Vector) -> None:
+    """One tick of a wheel-speed loop: PI with feed-forward and conditional integration."""
+    period = p[w.LOOP_PERIOD]
+    for side in range(2):
+        error = goal[side] - (s[8 + side] - before[side]) / period
+        before[side] = s[8 + side]
+        volts[side] = p[w.LOOP_FORWARD] * p[w.TORQUE_CONSTANT] * goal[side] \
+            + p[w.LOOP_GAIN] * error + integral[side]
+        if abs(volts[side]) < p[w.SUPPLY] or volts[side] * error < 0.0:
+            integral[side] += p[w.LOOP_INTEGRAL] * error * period
+        if goal[side] == 0.0 and abs(error) < 0.02:
+            integral[side] *= 0.9
+            volts[side] *= 0.5
 
 
 @compiled
-def _integrate(off: Vector, on: Vector, kind: int, at: float, width: float, demand: Vector,
-               rough: Vector, s: Vector, step: float, every: int, table: Vector) -> int:
+def _integrate(off: Vector, on: Vector, kind: int, at: float, width: float, sign: float,
+               arrivals: Vector, demand: Vector, rough: Vector, waves: Vector, s: Vector,
+               start: float, step: float, row_period: float, rough_period: float,
+               table: Vector) -> int:
     """Fill `table` row by row; return the number of rows that are finite."""
     n = s.size
     p = on.copy()
-    extra = np.zeros(5)
+    extra, force, floor, middle = np.zeros(5), np.zeros(3), np.zeros(5), np.zeros(n)
     k1, k2, k3, k4 = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    volts_left = 0.0
-    volts_right = 0.0
-    integral_left = 0.0
-    integral_right = 0.0
-    before_left = s[8]
-    before_right = s[9]
-    ticks = max(1, round(on[w.LOOP_PERIOD] / step))
-    per_rough = max(1, round(ROUGH_PERIOD / step))
-    row = 0
-    for j in range(demand.shape[0]):
-        time = j * step
-        if kind != 0:
-            _mix(off, on, _opening(kind, at, width, time, s[3]), p)
-        if p[w.LOOP] > 0.5:
-            if j % ticks == 0:
-                period = ticks * step
-                forward = p[w.LOOP_FORWARD] * p[w.TORQUE_CONSTANT]
-                error_left = demand[j, 0] - (s[8] - before_left) / period
-                error_right = demand[j, 1] - (s[9] - before_right) / period
-                before_left = s[8]
-                before_right = s[9]
-                volts_left = (forward * demand[j, 0] + p[w.LOOP_GAIN] * error_left
-                              + integral_left)
-                volts_right = (forward * demand[j, 1] + p[w.LOOP_GAIN] * error_right
-                               + integral_right)
-                # Conditional integration: hold while the chopper is at its end.
-                if abs(volts_left) < w.NOMINAL_SUPPLY or volts_left * error_left < 0.0:
-                    integral_left += p[w.LOOP_INTEGRAL] * error_left * period
-                if abs(volts_right) < w.NOMINAL_SUPPLY or volts_right * error_right < 0.0:
-                    integral_right += p[w.LOOP_INTEGRAL] * error_right * period
-                if demand[j, 0] == 0.0 and abs(error_left) < 0.02:
-                    integral_left *= 0.9
-                    volts_left *= 0.5
-                if demand[j, 1] == 0.0 and abs(error_right) < 0.02:
-                    integral_right *= 0.9
-                    volts_right *= 0.5
-        else:
-            volts_left = demand[j, 0]
-            volts_right = demand[j, 1]
-        floor = rough[min(j // per_rough, rough.shape[0] - 1)]
-        derivative(time, s, p, volts_left, volts_right, floor, k1, extra)
-        if j % every == 0:
-            table[row, 0] = time
-            table[row, 1:4] = s[0:3]
-            table[row, 4:7] = s[3:6]
-            table[row, 7:9] = s[6:8]
-            table[row, 9:11] = s[8:10]
-            table[row, 11:13] = s[18:20]
-            table[row, 13:15] = extra[0:2]
-            table[row, 15:18] = extra[2:5]
-            if not (abs(s[0]) < 50.0 and abs(s[6]) < 500.0 and abs(s[7]) < 500.0):
-                return row
-            row += 1
-        middle = time + 0.5 * step
-        derivative(middle, s + 0.5 * step * k1, p, volts_left, volts_right, floor, k2, extra)
-        derivative(middle, s + 0.5 * step * k2, p, volts_left, volts_right, floor, k3, extra)
-        derivative(time + step, s + step * k3, p, volts_left, volts_right, floor, k4, extra)
-        for i in range(n):
-            s[i] += step / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
-    return row
+    goal, volts, before, integral = np.zeros(2), np.zeros(2), s[8:10].copy(), np.zeros(2)
+    coming = 0
+    closed = on[w.LOOP] > 0.5
+    next_tick = start
+    time = start
+    for row in range(table.shape[0]):
+        end = start + (row + 1) * row_period
+        first = True
+        while end - time > 1e-9:
+            while coming < arrivals.size and arrivals[coming] <= time + 1e-9:
+                goal[0] = demand[coming, 0]
+                goal[1] = demand[coming, 1]
+                coming += 1
+            if kind != 0:
+                opening = _opening(kind, at, width, sign, time, s[3])
+                for k in range(p.size):
+                    p[k] = off[k] + opening * (on[k] - off[k])
+            if not closed:
+                volts[0] = goal[0]
+                volts[1] = goal[1]
+            elif time >= next_tick - 1e-9:
+                _control(s, goal, before, integral, volts, p)
+                next_tick += p[w.LOOP_PERIOD]
+            until = end
+            if coming < arrivals.size:
+                until = min(until, arrivals[coming])
+            if closed:
+                until = min(until, next_tick)
+            h = (until - time) / max(1, math.ceil((until - time) / step - 1e-6))
+            which = min(int((time - start) / rough_period), rough.shape[0] - 1)
+            for k in range(5):
+                floor[k] = rough[which, k]
+            for k in range(waves.shape[0]):
+                size = math.sin(waves[k, 0] * s[3] + waves[k, 1] * s[4] + waves[k, 2])
+                floor[2] += waves[k, 3] * size
+                floor[4] += waves[k, 4] * size
+                floor[0] += waves[k, 5] * size
+                floor[1] += waves[k, 6] * size
+            derivative(time, s, p, volts[0], volts[1], floor, force, k1, extra)
+            if first:
+                first = False
+                table[row, 0] = time
+                table[row, 1:7] = s[0:6]
+                table[row, 7:9] = s[10:12]
+                table[row, 9:11] = s[14:16]
+                table[row, 11:13] = s[8:10]
+                table[row, 13:15] = s[18:20]
+                table[row, 15:18] = extra[0:3]
+                if not (abs(s[0]) < 50.0 and abs(s[6]) < 500.0 and abs(s[7]) < 500.0):
+                    return row
+            for k in range(n):
+                middle[k] = s[k] + 0.5 * h * k1[k]
+            derivative(time + 0.5 * h, middle, p, volts[0], volts[1], floor, force, k2, extra)
+            for k in range(n):
+                middle[k] = s[k] + 0.5 * h * k2[k]
+            derivative(time + 0.5 * h, middle, p, volts[0], volts[1], floor, force, k3, extra)
+            for k in range(n):
+                middle[k] = s[k] + h * k3[k]
+            derivative(time + h, middle, p, volts[0], volts[1], floor, force, k4, extra)
+            for k in range(n):
+                s[k] += h / 6.0 * (k1[k] + 2.0 * k2[k] + 2.0 * k3[k] + k4[k])
+            time += h
+        time = end
+    return int(table.shape[0])
 
 
-def integrate(off: Vector, on: Vector, gate: Gate, demand: Vector, rough: Vector,
-              pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
-              step: float = STEP, every: int = STEPS_PER_ROW) -> Vector:
+def integrate(off: Vector, on: Vector, gate: Gate, arrivals: Vector, demand: Vector,
+              floor: Floor, seconds: float, pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+              step: float = STEP) -> Vector:
     """
-    Return what a hidden robot does, from rest.
+    Return what a hidden robot does, from rest at second 0.
 
     Parameters
     ----------
     off, on
-        The robot without and with its effect (`world.vector`), shape (66,).
+        The robot without and with its effect (`world.vector`).
     gate
         When or where `on` holds.
-    demand
-        Voltages asked of the driver [V], or wheel speeds asked of its loop [rad/s], left
-        and right, shape (n_steps, 2).
-    rough
-        Disturbances every 10 ms, shape (n, 5) (`dynamics.derivative`).
+    arrivals, demand
+        When [s, rising, shape (m,)] the driver is asked for which voltages [V], or its
+        loop for which wheel speeds [rad/s], left and right, shape (m, 2).
+    floor
+        Its roughness.
+    seconds
+        How long.
     pose
         x, y [m] and heading [rad] at the start.
-    step, every
-        Step [s], and steps per row of the result.
+    step
+        Largest step [s].
 
     Returns
     -------
     numpy.ndarray
-        Shape (n_rows, 18), columns `COLUMNS`, SI units.
+        Every `ROW_PERIOD`, columns `COLUMNS`, SI units; wheel speeds and angles are those of
+        the driven axles, motor angles those of the motor shafts, seen at the wheel.
 
     Raises
     ------
@@ -171,11 +213,12 @@ def integrate(off: Vector, on: Vector, gate: Gate, demand: Vector, rough: Vector
     """
     state = np.zeros(N_STATES)
     state[3:6] = pose
-    table = np.zeros((math.ceil(demand.shape[0] / every), len(COLUMNS)))
+    table = np.zeros((math.ceil(seconds / ROW_PERIOD), len(COLUMNS)))
     kinds = {'none': 0, 'time': 1, 'place': 2}
-    rows = _integrate(off, on, kinds[gate.kind], gate.at, gate.width,
-                      np.ascontiguousarray(demand), np.ascontiguousarray(rough),
-                      state, step, every, table)
+    rows = _integrate(off, on, kinds[gate.kind], gate.at, gate.width, gate.sign,
+                      np.ascontiguousarray(arrivals), np.ascontiguousarray(demand),
+                      np.ascontiguousarray(floor.rough), np.ascontiguousarray(floor.waves),
+                      state, 0.0, step, ROW_PERIOD, ROUGH_PERIOD, table)
     if rows != table.shape[0] or not np.isfinite(table).all():
-        raise FloatingPointError(f'the hidden robot left its bounds at {rows * every * step} s')
+        raise FloatingPointError(f'the hidden robot left its bounds at {rows * ROW_PERIOD} s')
     return table

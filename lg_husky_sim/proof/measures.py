@@ -109,7 +109,7 @@ def share(plain: float, augmented: float, truth: float, least: float = 0.1) -> f
     return (plain - augmented) / achievable if math.isfinite(augmented) else -1.0
 
 
-def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
+def wilson(hits: float, count: int, z: float = 1.96) -> tuple[float, float]:
     """
     Return Wilson's interval of a proportion (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927).
 

@@ -61,20 +61,18 @@ def plot_rates(axes: Axes, results: Json) -> None:
     axes.grid(axis='x', color='#e0e0e0')
 
 
-def plot_shares(axes: Axes, results: Json) -> None:
-    """Draw the median share of the achievable improvement by effect, without a baseline."""
-    rows = [(name, row['median_share']) for name, row in results['by_effect'].items()
-            if row['median_share'] is not None]
-    rows.sort(key=lambda row: row[1])
-    values = [max(value, -0.5) for _, value in rows]
-    axes.barh(range(len(rows)), values,
-              color=['#3182bd' if value >= 0.85 else '#bdbdbd' for value in values])
-    axes.axvline(0.85, color='black', linewidth=1)
-    axes.axvline(1.0, color='#969696', linewidth=0.5)
-    axes.set_yticks(range(len(rows)), [name for name, _ in rows], fontsize=7)
-    axes.set_xlabel('share of the achievable held-out improvement, robots without a baseline '
-                    '(black line: target)')
-    axes.set_xlim(-0.55, 1.25)
+def plot_reliability(axes: Axes, results: Json) -> None:
+    """Draw the share right against the stated confidence, with 95 % intervals."""
+    axes.plot([0.0, 1.0], [0.0, 1.0], color='#969696', linewidth=1)
+    for row in results['reliability']['bins']:
+        axes.plot([row['stated']] * 2, [row['low'], row['high']], color='#3182bd', linewidth=2)
+        axes.plot(row['stated'], row['right'], 'o', color='#3182bd', markersize=5)
+        axes.annotate(str(row['count']), (row['stated'], row['right']), fontsize=7,
+                      xytext=(5, -3), textcoords='offset points')
+    axes.set_xlim(-0.02, 1.05)
+    axes.set_ylim(-0.02, 1.02)
+    axes.set_xlabel('stated confidence (mean of the bin; number of cases beside)')
+    axes.set_ylabel('share right, 95 % interval')
 
 
 def draw(results: Json, folder: Path) -> tuple[Path, ...]:
@@ -95,8 +93,8 @@ def draw(results: Json, folder: Path) -> tuple[Path, ...]:
     height = 2.5 + 0.19 * len(results['confusion']['hidden'])
     paths = []
     for name, size, plot in (('proof_confusion', (9.0, height), plot_confusion),
-                             ('proof_rates', (9.0, 4.5), plot_rates),
-                             ('proof_shares', (8.0, 6.5), plot_shares)):
+                             ('proof_rates', (9.0, 5.0), plot_rates),
+                             ('proof_reliability', (5.5, 4.5), plot_reliability)):
         figure = Figure(figsize=size, layout='constrained')
         FigureCanvasAgg(figure)
         plot(figure.subplots(), results)

@@ -21,7 +21,9 @@ Vector = NDArray[np.float64]
 Bag = dict[str, Vector]
 
 _PERIOD = 0.005
-_START = (1.3016, 12.8650, w.COMMAND_GAIN)
+_START = (1.3016, 12.8650, 0.8961)
+_SUPPLY = 24.0
+_TURN_RATIO = 0.541
 
 
 def matrices(damping: float, scrub: float) -> tuple[Vector, Vector]:
@@ -100,9 +102,9 @@ def simulate(fitted: Sequence[float], bag: Bag) -> Bag:
     times = start + np.arange(int((end - start) / _PERIOD)) * _PERIOD
     edges = np.append(times, times[-1] + _PERIOD)
     forward, yaw = (_held_mean(commands[:, 0], commands[:, k], edges) for k in (1, 2))
-    volts = w.NOMINAL_SUPPLY * gain * np.column_stack(
-        [forward - w.TURN_RATIO * yaw, forward + w.TURN_RATIO * yaw])
-    volts = np.clip(volts, -w.NOMINAL_SUPPLY, w.NOMINAL_SUPPLY)
+    volts = _SUPPLY * gain * np.column_stack(
+        [forward - _TURN_RATIO * yaw, forward + _TURN_RATIO * yaw])
+    volts = np.clip(volts, -_SUPPLY, _SUPPLY)
     rows = np.zeros((times.size, 6))
     _march(np.ascontiguousarray(step[:6, :6]), np.ascontiguousarray(step[:6, 6:]), volts, rows)
     pose = bag['poses'][0, 1:4]

@@ -1,23 +1,29 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which cases a trial consists of, balanced over effects, severities and drives."""
+"""Which cases a trial consists of, balanced over effects, severities, floors and sensors."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 from lg_husky_sim.errors import CommandError
-from lg_husky_sim.proof import catalogue
-from lg_husky_sim.proof.cases import Spec
+from lg_husky_sim.proof import catalogue, conventions
+from lg_husky_sim.proof.cases import Spec, WORLDS
+from lg_husky_sim.proof.settings import settings
 import numpy as np
 
-FIRST_REPORT_SEED = 10_000
-# Of every case: share of singles, clean, pairs, outside.
-_SHARES = (('single', 0.62), ('clean', 0.15), ('pair', 0.13), ('outside', 0.10))
-_LEVELS = ('medium', 'strong', 'weak', 'medium', 'strong')
+Rng = np.random.Generator
+
+
+def first_report_seed() -> int:
+    """Return the first seed of reports; those below are for tuning."""
+    return int(settings()['plan']['first_report_seed'])
 
 
 def check_seeds(seed: int, cases: int, report: bool) -> None:
     """
-    Keep tuning and reporting apart: seeds below 10000 are for tuning only.
+    Keep tuning and reporting apart, and reported seeds spent.
 
     Raises
     ------
@@ -25,27 +31,51 @@ def check_seeds(seed: int, cases: int, report: bool) -> None:
         The seeds do not belong to what the trial is for.
 
     """
-    last = seed + cases - 1
-    if report and seed < FIRST_REPORT_SEED:
-        raise CommandError(f'seed = {seed} is a tuning seed; a report needs '
-                           f'{FIRST_REPORT_SEED} or more')
-    if not report and last >= FIRST_REPORT_SEED:
+    first, last = first_report_seed(), seed + cases - 1
+    if report and seed < first:
+        raise CommandError(f'seed = {seed} is a tuning seed; a report needs {first} or more')
+    if not report and last >= first:
         raise CommandError(f'seeds {seed} to {last} reach the reporting seeds; tuning '
-                           f'must stay below {FIRST_REPORT_SEED}')
+                           f'must stay below {first}')
+    for low, high in settings()['plan']['spent']:
+        if report and seed <= high and last >= low:
+            raise CommandError(f'seeds {seed} to {last} reach {low} to {high}, which were '
+                               'reported before; a reported set is used once')
 
 
-def _worlds(world: str, count: int, rng: np.random.Generator) -> list[str]:
+class Deck:
+    """Draw without putting back, until every card has come up."""
+
+    def __init__(self, rng: Rng) -> None:
+        self.rng, self.decks = rng, dict[str, list[Any]]()
+
+    def draw(self, key: str, cards: Sequence[Any]) -> Any:
+        """Return the next of some cards, which are shuffled again when all are out."""
+        if not self.decks.get(key):
+            self.decks[key] = [cards[int(k)] for k in self.rng.permutation(len(cards))]
+        return self.decks[key].pop()
+
+
+def _pick(rng: Rng, shares: Mapping[str, float]) -> str:
+    total = sum(shares.values())
+    return str(rng.choice(list(shares), p=[share / total for share in shares.values()]))
+
+
+def _worlds(world: str, tuning: bool, rng: Rng) -> str:
     if world != 'mix':
-        return [world] * count
-    return [str(name) for name in rng.choice(['g1', 'g2', 'g3'], count, p=[0.7, 0.12, 0.18])]
+        return world
+    left_out = conventions.left_out('worlds', tuning)
+    return _pick(rng, {name: float(share) for name, share in settings()['plan']['worlds'].items()
+                       if name not in left_out})
 
 
-def plan(count: int, seed: int, world: str = 'g1', drive: str = 'mix') -> tuple[Spec, ...]:
+def plan(count: int, seed: int, world: str = 'g1', tuning: bool = True) -> tuple[Spec, ...]:
     """
     Return the cases of a trial, in random order.
 
     Every effect of the catalogue comes up equally often (within one), severities in
-    the proportion weak 1, medium 2, strong 2. Where a case's drives cannot show its effect,
+    the proportion weak 1, medium 2, strong 2, and clean robots on every floor with every
+    kind of wheel speeds. Where a case's drives cannot show its effect,
     `trial.prepare` draws another one.
 
     Parameters
@@ -55,48 +85,52 @@ def plan(count: int, seed: int, world: str = 'g1', drive: str = 'mix') -> tuple[
     seed
         Seed of the first case; the k-th has `seed + k`.
     world
-        'g1', 'g2', 'g3' or 'mix'.
-    drive
-        'paper', 'full', 'drive-like' or 'mix'.
+        One of `cases.WORLDS`, or 'mix'.
+    tuning
+        Leave out the families that tuning may not see.
+
+    Raises
+    ------
+    CommandError
+        The world is left out of tuning.
 
     """
+    numbers = settings()['plan']
+    if world != 'mix' and world in conventions.left_out('worlds', tuning):
+        raise CommandError(f'world {world} is left out of tuning; it is for reports only')
+    if world not in (*WORLDS, 'mix'):
+        raise CommandError(f'world = {world!r} is none of {", ".join((*WORLDS, "mix"))}')
     rng = np.random.default_rng([seed, 77])
+    deck = Deck(rng)
     kinds: list[str] = []
-    for kind, share in _SHARES[1:]:
-        kinds += [kind] * round(share * count)
+    for kind, share in numbers['shares'].items():
+        if kind != 'single':
+            kinds += [kind] * round(float(share) * count)
     kinds += ['single'] * (count - len(kinds))
     kinds = [str(kind) for kind in rng.permutation(kinds)]
-    decks: dict[str, list[str]] = {}
-    result = []
-    for k, (kind, where) in enumerate(zip(kinds, _worlds(world, count, rng), strict=True)):
-        chosen: tuple[str, ...] = ()
-        severity = ''
-        if kind in ('single', 'outside'):
-            name = _next(decks, kind, where, rng)
-            severity = _severity(decks, name, kind, where, rng)
-            chosen = (name,)
-        which = drive
-        if drive == 'mix':
-            which = str(rng.choice(['paper', 'full', 'drive-like'], p=[0.5, 0.38, 0.12]))
-        result.append(Spec(seed + k, kind, where, which, chosen, severity))
-    return tuple(result)
+    return tuple(_spec(seed + k, kind, _worlds(world, tuning, rng), tuning, deck)
+                 for k, kind in enumerate(kinds))
 
 
-def _next(decks: dict[str, list[str]], kind: str, where: str, rng: np.random.Generator) -> str:
-    """Draw without putting back, until every name has come up."""
-    key = f'{kind} {where}'
-    if not decks.get(key):
+def _spec(seed: int, kind: str, where: str, tuning: bool, deck: Deck) -> Spec:
+    numbers = settings()['plan']
+    chosen: tuple[str, ...] = ()
+    severity = floor = wheels = ''
+    if kind in ('single', 'outside'):
         names = sorted(catalogue.SUBSYSTEM if kind == 'single' else catalogue.OUTSIDE)
-        names = [name for name in names if name not in catalogue.absent_from(where)]
-        decks[key] = [str(name) for name in rng.permutation(names)]
-    return decks[key].pop()
-
-
-def _severity(decks: dict[str, list[str]], name: str, kind: str, where: str,
-              rng: np.random.Generator) -> str:
-    if kind == 'outside' or where != 'g1':
-        return str(rng.choice(['medium', 'strong']))
-    key = f'severity {name}'
-    if not decks.get(key):
-        decks[key] = [str(level) for level in rng.permutation(_LEVELS)]
-    return decks[key].pop()
+        absent = catalogue.absent_from(where)
+        name = str(deck.draw(f'{kind} {where}', [name for name in names if name not in absent]))
+        chosen = (name,)
+        known = kind == 'single' and where == 'g1'
+        severity = str(deck.draw(f'severity {name}', numbers['severities']) if known
+                       else deck.rng.choice(['medium', 'strong']))
+    elif kind == 'clean':
+        axes = settings()['conventions']
+        floor = str(deck.draw('floor', list(axes['floor']['levels'])))
+        wheels = str(deck.draw('wheels', [
+            name for name in axes['wheels']['kinds']
+            if name not in conventions.left_out('wheels', tuning)]))
+    long = deck.rng.random() < float(numbers['long'])
+    low, high = settings()['conventions']['seconds'] if long else numbers['seconds']
+    return Spec(seed, kind, where, _pick(deck.rng, numbers['drives']), chosen, severity,
+                tuning=tuning, floor=floor, wheels=wheels, seconds=(float(low), float(high)))

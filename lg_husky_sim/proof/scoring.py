@@ -1,117 +1,145 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Compare sealed answers with diagnoses, case by case."""
+"""
+Mark what was said of a case against what is true; the marks are those of the outside exams.
+
+As many findings count as there are true effects, the strongest first. A name is worth 1, a
+related one 0.5; where the true effect stands in one declared group of inseparable
+effects with the named one, a related name is worth 1 and another 0.5.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+import itertools
 import math
 from pathlib import PurePath
 from typing import Any
 
 from lg_husky_sim.proof import catalogue
 from lg_husky_sim.proof.measures import share
+from lg_husky_sim.proof.settings import settings
 
-CONFIDENT = 0.9
 Json = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """
+    One true effect against the finding that was matched to it.
+
+    `named`: 0, 0.5 or 1; `outright` the right name; `considered` so among the first two or
+    declared inseparable; `part` the right subsystem; `side` None where both are hit;
+    `onset` its error [s or m], None where there is none to find.
+    """
+
+    effect: str
+    known: bool
+    severity: str
+    named: float
+    outright: bool
+    considered: bool
+    part: bool
+    side: bool | None
+    onset_kind: str
+    onset: float | None
 
 
 @dataclass(frozen=True)
 class Judgement:
     """
-    One case, judged.
+    One case, marked.
 
     Attributes
     ----------
-    case, kind, world, drive, effects, severities
-        The case, as the answer says.
-    failed
-        Why there is no diagnosis, or no drive of its model, or ''.
-    verdict
-        'nothing_missing', 'known', 'unknown' or '' (failed).
-    named
-        Effects that were named, in order; 'unknown' where the finding says so.
+    case, kind, level, world, regime, unseen
+        The case; `unseen` families were left out of tuning.
     first
-        `named` or inner ones: the first name, 'unknown', 'nothing' or 'failed'.
-    top1, top2, nearest, subsystem, side
-        The first name, one of the first two or declared inseparable, the same or the nearest
-        entry of an "unknown", the first subsystem, the side are right (None: not asked).
-    found
-        How many of the hidden effects are among the names.
+        The first name, 'unknown', 'nothing' or 'failed'.
+    said
+        All names.
+    claim
+        Something was said to be missing.
+    marks
+        One a true effect.
     extra
         Known effects that were named and are not there.
     acceptable
-        For a kind outside the catalogue: called unknown, or the right subsystem without a
-        confident wrong name.
-    onset_kind
-        True kind of onset.
-    onset_error
-        Seconds or metres; infinite where no onset or the wrong recording was given; None
-        where there is no onset to find.
+        Of an effect outside the catalogue: unknown, or the right part everywhere.
+    timid
+        Nothing claimed, or without certainty.
+    right
+        0 or 1; None where it does not count (weak or undetectable, and timid).
     onset_invented
         An onset was given where there is none.
-    shares
-        Share of the achievable held-out improvement ('all' and 'position_m'), None where
-        nothing could be gained; 0 where a failure left nothing to measure.
-    seconds
-        Run time of the diagnosis.
+    confidence, failed, seconds, shares
+        As stated; why there is no diagnosis; run time [s]; shares of the achievable
+        held-out improvement ('all', 'position_m').
 
     """
 
     case: str
     kind: str
+    level: str
     world: str
-    drive: str
-    effects: tuple[str, ...]
-    severities: tuple[str, ...]
-    failed: str
-    verdict: str
-    named: tuple[str, ...]
+    regime: Mapping[str, str]
+    unseen: tuple[str, ...]
     first: str
-    top1: bool
-    top2: bool
-    nearest: bool
-    subsystem: bool
-    side: bool | None
-    found: int
+    said: tuple[str, ...]
+    claim: bool
+    marks: tuple[Mark, ...]
     extra: int
     acceptable: bool
-    onset_kind: str
-    onset_error: float | None
+    timid: bool
+    right: float | None
     onset_invented: bool
-    shares: Mapping[str, float | None]
+    confidence: float | None
+    failed: str
     seconds: float
+    shares: Mapping[str, float | None]
 
 
-def _declared(diagnosis: Json, named: str, truth: str) -> bool:
-    """Tell whether the diagnosis says that `named` and `truth` cannot be told apart."""
-    return any({named, truth} <= set(item.get('effects', ()))
-               for item in diagnosis.get('indistinguishable', ()))
+def _credit(true: Json, said: str, groups: Sequence[set[str]]) -> float:
+    """Return what a name is worth."""
+    if said == true['effect'] or (said == 'unknown' and not true['in_list']):
+        return 1.0
+    near = said in true['related_answers']
+    if any(said in group and true['effect'] in group for group in groups):
+        return 1.0 if near else 0.5
+    return 0.5 if near else 0.0
 
 
-def _second(findings: Sequence[Json]) -> str:
-    """Return the name that stands second: the next finding, else the best rival, or ''."""
-    if len(findings) > 1:
-        return str(findings[1].get('effect'))
-    rivals = findings[0].get('rivals') or () if findings else ()
-    best: Json = max(rivals, default={}, key=lambda rival: float(
-        rival.get('held_out_gain_nats') or -math.inf))
-    return str(best.get('effect', ''))
+def _onset_error(begins: Json, said: Json) -> float:
+    """Return by how much an onset is wrong [s or m]; infinite where it is no such onset."""
+    if begins['type'] == 'time':
+        if said.get('kind') == 'time' and said.get('time_s') is not None \
+                and PurePath(str(said.get('recording'))).name == begins['recording']:
+            return abs(float(said['time_s']) - float(begins['seconds_after_epoch']))
+    elif said.get('kind') == 'place' and said.get('x_m') is not None:
+        return abs(float(said['x_m']) - float(begins['x0']))
+    return math.inf
 
 
-def _onset_error(truth: Json, findings: Sequence[Json]) -> float:
-    best = math.inf
-    for finding in findings:
-        said = finding.get('onset') or {}
-        if said.get('kind') != truth['kind']:
-            continue
-        if truth['kind'] == 'time' and said.get('time_s') is not None:
-            if PurePath(str(said.get('recording'))).name == truth['recording']:
-                best = min(best, abs(float(said['time_s']) - float(truth['time_s'])))
-        elif truth['kind'] == 'place' and said.get('x_m') is not None:
-            best = min(best, abs(float(said['x_m']) - float(truth['x_m'])))
-    return best
+def _mark(true: Json, finding: Json, groups: Sequence[set[str]]) -> Mark:
+    said = str(finding.get('effect', ''))
+    named, right = _credit(true, said, groups), said == true['effect']
+    rivals = [str(rival[0]) for rival in sorted(
+        finding.get('rivals') or (), key=lambda rival: -float(rival[1] or -math.inf))]
+    begins: Json = true.get('onset') or {}
+    begun = begins.get('type') in ('time', 'place')
+    two_sided = true['effect'] == 'coulomb_drivetrain'
+    return Mark(
+        true['effect'], bool(true['in_list']), str(true.get('severity') or ''), named,
+        right or (named == 1.0 and said == 'unknown'),
+        named == 1.0 or true['effect'] in rivals[:1]
+        or any(true['effect'] in group for group in groups),
+        finding.get('subsystem') == true['subsystem']
+        or (right and catalogue.SUBSYSTEM.get(said) == finding.get('subsystem')),
+        finding.get('side') == true['side'] if right and (true['side'] != 'both' or two_sided)
+        else None,
+        str(begins.get('type', 'none')),
+        _onset_error(begins, finding.get('onset') or {}) if begun else None)
 
 
 def _begins_later(said: Json) -> bool:
@@ -119,11 +147,11 @@ def _begins_later(said: Json) -> bool:
     if said.get('kind', 'none') == 'time' and said.get('time_s') is not None:
         return not (PurePath(str(said.get('recording'))).name == 'rec1'
                     and float(said['time_s']) < 1.0)
-    return str(said.get('kind', 'none')) != 'none'
+    return str(said.get('kind', 'none')) not in ('none', 'set')
 
 
 def _shares(held_out: Sequence[Json], failed: bool) -> dict[str, float | None]:
-    if failed and not held_out:
+    if failed:
         return dict.fromkeys(('all', 'position_m'), 0.0)
     result: dict[str, float | None] = {}
     for name in ('all', 'position_m'):
@@ -133,61 +161,55 @@ def _shares(held_out: Sequence[Json], failed: bool) -> dict[str, float | None]:
     return result
 
 
-def judge(answer: Json, outcome: Json) -> Judgement:
+def _matched(line: Json, claim: bool) -> tuple[Mark, ...]:
+    """Match findings to true effects as favourably as can be."""
+    largest = int(settings()['marks']['largest_group'])
+    groups = [set(group) for group in line['groups'] if len(group) <= largest] if claim else []
+    true: Sequence[Json] = line['true']
+    found = sorted(line['said'], key=lambda item: -float(item['gain'] or 0.0)) if claim else []
+    top = [*found[:len(true)], *([{}] * len(true))][:len(true)]
+    return max(
+        (tuple(_mark(t, f, groups) for t, f in zip(true, order, strict=True))
+         for order in itertools.permutations(top)),
+        key=lambda marks: sum(4.0 * mark.named + mark.part for mark in marks))
+
+
+def judge(line: Json) -> Judgement:
     """
     Judge one case.
 
     Parameters
     ----------
-    answer
-        The sealed answer (`cases.generate`).
-    outcome
-        What came of it (`trial.diagnose`): 'diagnosis' (diagnosis.json or None), 'error',
-        'seconds' and 'held_out' (list of 'plain', 'augmented', 'truth' errors).
+    line
+        Its outcome (`outcomes.line_of`).
 
     """
-    spec = answer['spec']
-    hidden = [item['effect'] for item in answer['effects']]
-    diagnosis: Json = outcome.get('diagnosis') or {}
-    findings: Sequence[Json] = diagnosis.get('findings') or ()
-    verdict = str(diagnosis.get('verdict', ''))
-    named = tuple(str(finding.get('effect')) for finding in findings)
-    first = named[0] if named else ('nothing' if verdict == 'nothing_missing' else verdict)
-    if not diagnosis:
-        first = 'failed'
-    if verdict == 'unknown':
-        first = 'unknown'
-    known = [name for name in named if name in catalogue.SUBSYSTEM]
-    truths = set(hidden)
-    top1 = bool(hidden) and first in truths
-    second = _second(findings) in truths or any(
-        _declared(diagnosis, name, truth) for name in named[:1] for truth in hidden)
-    # Rivals of an "unknown" were refused as names.
-    top2, nearest = top1 or (second and verdict == 'known'), top1 or second
-    failed = str(outcome.get('error') or outcome.get('held_out_error') or '')
-    places = {catalogue.subsystem(name) for name in hidden}
-    place = str(findings[0].get('subsystem')) if findings else ''
-    right_place = place in places
-    confidence = float(diagnosis.get('confidence') or 0.0)
-    acceptable = verdict == 'unknown' or (
-        right_place and not (known and confidence >= CONFIDENT))
-    sides = {item['effect']: item['side'] for item in answer['effects']}
-    side: bool | None = None
-    for finding in findings:
-        if sides.get(str(finding.get('effect'))) in ('left', 'right'):
-            side = finding.get('side') == sides[str(finding['effect'])]
-    onset = answer['onset']
-    error = _onset_error(onset, findings) if onset['kind'] != 'none' else None
-    invented = onset['kind'] == 'none' and any(
-        _begins_later(finding.get('onset') or {}) for finding in findings)
+    failed = str(line['failed'])
+    claim = not failed and line['verdict'] != 'nothing_missing'
+    said = tuple(str(item['effect']) for item in line['said'])
+    first = said[0] if said else 'nothing'
+    if failed or line['verdict'] == 'unknown':
+        first = 'failed' if failed else 'unknown'
+    confidence = None if line['confidence'] is None else float(line['confidence'])
+    sure = float(settings()['marks']['sure'])
+    timid = not failed and (not claim or (confidence or 0.0) < sure)
+    marks = _matched(line, claim)
+    all_named = bool(marks) and all(mark.named == 1.0 for mark in marks)
+    outside = any(not mark.known for mark in marks)
+    acceptable = all_named or (outside and claim and (
+        line['verdict'] == 'unknown' or all(mark.part for mark in marks)))
+    right: float | None = float(acceptable)
+    if line['level'] == 'clean':
+        right = float(not failed and not claim)
+    elif timid and not all_named and line['level'] in ('weak', 'undetectable'):
+        right = None
+    truths = {str(item['effect']) for item in line['true']}
+    begins = any(mark.onset is not None for mark in marks)
     return Judgement(
-        case=str(answer['case']), kind=spec['kind'], world=spec['world'], drive=spec['drive'],
-        effects=tuple(hidden),
-        severities=tuple(item['severity'] for item in answer['effects']),
-        failed=failed, verdict=verdict, named=named, first=first,
-        top1=top1, top2=top2, nearest=nearest, subsystem=right_place, side=side,
-        found=len(truths & set(named)), extra=len([n for n in known if n not in truths]),
-        acceptable=acceptable and bool(diagnosis), onset_kind=onset['kind'],
-        onset_error=error, onset_invented=invented,
-        shares=_shares(outcome.get('held_out') or (), bool(failed)),
-        seconds=float(outcome.get('seconds') or math.nan))
+        str(line['case']), str(line['kind']), str(line['level']), str(line['world']),
+        line['regime'], tuple(line['unseen']), first, said, claim, marks,
+        len([name for name in said if name in catalogue.SUBSYSTEM and name not in truths]),
+        acceptable, timid, right,
+        claim and not begins and any(_begins_later(item['onset'] or {}) for item in line['said']),
+        confidence, failed, float(line['seconds']),
+        _shares(line['held_out'], bool(failed or line['held_out_failed'])))

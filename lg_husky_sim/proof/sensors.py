@@ -1,267 +1,261 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From what a hidden robot was asked to what its sensors publish."""
+"""What the sensors of a hidden robot publish, by the conventions of its log."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lg_husky_sim.proof import world as w
 from lg_husky_sim.proof.bags import Published
-from lg_husky_sim.proof.integrate import COLUMNS, STEP
-from lg_husky_sim.proof.manoeuvres import Manoeuvre
+from lg_husky_sim.proof.commands import Sent
+from lg_husky_sim.proof.conventions import Conventions, Gyro, Wheels
+from lg_husky_sim.proof.integrate import COLUMNS
 import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
+Rng = np.random.Generator
+
+SIDES = ('left', 'right')
 
 
 @dataclass(frozen=True)
-class CommandPath:
+class Faults:
     """
-    The way from the publisher to the voltage; the last ten are effects, zero when off.
+    Faults of the sensors; zero (factors one) when off.
 
-    Times in seconds, rates in m/s² and rad/s², limits in m/s and rad/s (0: none),
-    `since` the time from which effects hold, `loop_lag` the time constant of a speed
-    loop's reference, `loop_yaw_ratio` its wheel-to-yaw multiplier. `own` are latency,
-    slews and limits that hold until then: a robot as sold has some of its own.
-    """
-
-    gain: float = w.COMMAND_GAIN
-    delay_low: float = 0.0
-    delay_high: float = 0.0
-    loss: float = 0.0
-    since: float = -1.0
-    latency: float = 0.0
-    slew_forward: float = 0.0
-    slew_yaw: float = 0.0
-    limit_forward: float = 0.0
-    limit_yaw: float = 0.0
-    stutter_period: float = 0.0
-    stutter_hold: float = 0.0
-    loop_lag: float = 0.0
-    loop_yaw_ratio: float = 1.875
-    cutback: float = 0.0
-    own: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
-
-    @property
-    def limits(self) -> tuple[float, float, float, float, float]:
-        """Latency, slews forward and yaw, limits forward and yaw."""
-        return (self.latency, self.slew_forward, self.slew_yaw, self.limit_forward,
-                self.limit_yaw)
-
-
-@dataclass(frozen=True)
-class Senses:
-    """
-    Noise and faults of the sensors; faults are zero (factors one) when off.
-
-    Angles in rad, rates in rad/s, accelerations in m/s², times in s; `late` names the
+    Rates in rad/s (`gyro_drift` over the whole recording), times in s; `late` names the
     stream whose stamps are `late_by` seconds late; `since` is when faults begin.
+    `on_motor`: 'yes' where the encoder sits on the motor's shaft.
     """
 
-    tick: float = 1e-3
-    stamp_jitter: float = 5e-4
-    gyro_noise: float = 0.008
-    accel_noise: float = 0.12
-    accel_bias: float = 0.0
-    pose_rate: float = 50.0
-    pose_noise: float = 0.006
-    heading_noise: float = 0.004
-    gaps: tuple[tuple[float, float], ...] = ()
-    nuisance_bias: float = 0.0
-    stamped: bool = True
-    suffix: str = ''
     since: float = -1.0
     gyro_bias: float = 0.0
+    gyro_drift: float = 0.0
     gyro_factor: float = 1.0
     gyro_clip: float = 0.0
     encoder_left: float = 1.0
     encoder_right: float = 1.0
+    on_motor: str = 'no'
     late: str = ''
     late_by: float = 0.0
 
 
-def received(drive: Manoeuvre, path: CommandPath, rng: np.random.Generator | None,
-             step: float = STEP) -> Vector:
-    """
-    Return the command that reaches the driver at every fine step, shape (n, 2).
-
-    Without `rng` nothing is lost and every command takes the mean nuisance delay.
-    """
-    count = round(drive.duration / step)
-    times = np.arange(count) * step
-    publish = drive.times
-    if rng is None:
-        arrive = publish + 0.5 * (path.delay_low + path.delay_high)
-        kept = np.ones(publish.size, dtype=bool)
-    else:
-        arrive = publish + rng.uniform(path.delay_low, path.delay_high + 1e-9, publish.size)
-        kept = rng.random(publish.size) >= path.loss
-    active = publish >= path.since
-    arrive = arrive + np.where(active, path.latency, path.own[0])
-    if path.stutter_period > 0.0:
-        phase = np.mod(arrive, path.stutter_period)
-        frozen = active & (phase < path.stutter_hold)
-        arrive = np.where(frozen, arrive - phase + path.stutter_hold, arrive)
-    kept[0] = True
-    arrive = np.maximum.accumulate(arrive[kept])
-    which = np.searchsorted(arrive, times, side='right') - 1
-    held = drive.commands[kept][np.maximum(which, 0)]
-    held[which < 0] = 0.0
-    on = times >= path.since
-    for column in (0, 1):
-        # 0 stands for no limit.
-        limit = np.where(on, path.limits[3 + column], path.own[3 + column])
-        limit[limit <= 0.0] = np.inf
-        held[:, column] = np.clip(held[:, column], -limit, limit)
-    for column in (0, 1):
-        slew = np.where(on, path.limits[1 + column], path.own[1 + column])
-        if np.any(slew > 0.0):
-            slew[slew <= 0.0] = np.inf
-            held[:, column] = _slewed(held[:, column], slew * step)
-    if path.cutback > 0.0:
-        busy = np.mod(times, 11.0) > 8.5
-        held[on & busy] *= 1.0 - path.cutback
-    if path.loop_lag > 0.0:
-        held = _lagged(held, step / path.loop_lag)
-    return held
-
-
-def _slewed(values: Vector, most: Vector) -> Vector:
-    """Limit the change per step."""
-    result = values.copy()
-    for k in range(1, values.size):
-        change = values[k] - result[k - 1]
-        if change > most[k]:
-            result[k] = result[k - 1] + most[k]
-        elif change < -most[k]:
-            result[k] = result[k - 1] - most[k]
-    return result
-
-
-def _lagged(values: Vector, share: float) -> Vector:
-    from scipy.signal import lfilter
-    result: Vector = lfilter([share], [1.0, share - 1.0], values, axis=0)
-    return result
-
-
-def demanded(commands: Vector, path: CommandPath, loop: bool, radius: float,
-             track: float) -> Vector:
-    """Return voltages [V], or wheel speeds [rad/s] with a speed loop; shape (n, 2)."""
-    forward, yaw = commands[:, 0], commands[:, 1]
-    if loop:
-        split = 0.5 * track * path.loop_yaw_ratio * yaw
-        return np.column_stack([(forward - split) / radius, (forward + split) / radius])
-    volts = w.NOMINAL_SUPPLY * path.gain
-    return np.column_stack([volts * (forward - w.TURN_RATIO * yaw),
-                            volts * (forward + w.TURN_RATIO * yaw)])
-
-
-def _at(table: Vector, name: str, times: Vector) -> Vector:
+def column(table: Vector, name: str, times: Vector) -> Vector:
+    """Return a column of the motion at some times."""
     return np.interp(times, table[:, 0], table[:, COLUMNS.index(name)])
 
 
-def _mean_before(table: Vector, name: str, times: Vector, window: float) -> Vector:
-    """Mean of a column over the `window` seconds before each time (anti-alias filter)."""
-    step = table[1, 0] - table[0, 0]
-    total = np.concatenate([[0.0], np.cumsum(table[:, COLUMNS.index(name)]) * step])
-    edges = np.concatenate([table[:, 0], [table[-1, 0] + step]])
-    before = np.interp(times - window, edges, total)
-    result: Vector = (np.interp(times, edges, total) - before) / window
+def _filtered(table: Vector, values: Vector, lag: float, times: Vector) -> Vector:
+    """First-order low-pass with time constant `lag` [s]."""
+    from scipy.signal import lfilter
+    keep = float(np.exp(-(table[1, 0] - table[0, 0]) / lag))
+    smooth = lfilter([1.0 - keep], [1.0, -keep], values)
+    result: Vector = np.interp(times, table[:, 0], smooth)
     return result
 
 
-def _ticks(end: float, rate: float, rng: np.random.Generator) -> Vector:
-    phase = rng.uniform(0.0, 1.0 / rate)
-    times: Vector = np.arange(0.02 + phase, end, 1.0 / rate)
-    return times
+def _mean(table: Vector, values: Vector, window: float, times: Vector) -> Vector:
+    """Mean over the `window` seconds before each time."""
+    step = table[1, 0] - table[0, 0]
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1])) * step])
+    result: Vector = (np.interp(times, table[:, 0], total)
+                      - np.interp(times - window, table[:, 0], total)) / window
+    return result
 
 
-def publish(table: Vector, drive: Manoeuvre, senses: Senses,
-            rng: np.random.Generator) -> Published:
+def faulty_angle(table: Vector, side: str, faults: Faults) -> Vector:
+    """Angle that an encoder sees; a wrong factor acts on what it counts from its onset on."""
+    source = 'motor' if faults.on_motor == 'yes' else 'angle'
+    angle = table[:, COLUMNS.index(f'{source}_{side}')]
+    factor = faults.encoder_left if side == 'left' else faults.encoder_right
+    if factor == 1.0:
+        return angle
+    moved = np.concatenate([[0.0], np.diff(angle)])
+    moved[table[:, 0] > faults.since] *= factor
+    result: Vector = angle[0] + np.cumsum(moved)
+    return result
+
+
+def wheel_speeds(table: Vector, angle: Vector, how: Wheels, times: Vector, radius: float,
+                 rng: Rng | None) -> tuple[Vector, Vector]:
+    """
+    Return counted angle [rad] and speed [rad/s] of one encoder at some times.
+
+    'difference': counts over the window before; 'instant': the rate itself, with noise;
+    'lowpass': filtered; 'rounded': to steps of metres per second; 'positions': none (zeros).
+    Without `rng` there is no noise and no tick.
+    """
+    def count(when: Vector) -> Vector:
+        exact = np.interp(when, table[:, 0], angle)
+        if rng is None:
+            return exact
+        return np.asarray(np.floor((exact + start) / how.tick) * how.tick)
+
+    start = 0.0 if rng is None else float(rng.uniform(0.0, how.tick))
+    counted = count(times)
+    if how.kind == 'positions':
+        return counted, np.zeros(times.size)
+    if how.kind == 'difference':
+        return counted, (counted - count(times - how.window)) / how.window
+    rate = np.gradient(angle, table[:, 0])
+    if how.kind == 'lowpass':
+        speed = _filtered(table, rate, how.window, times)
+    else:
+        speed = np.interp(times, table[:, 0], rate)
+    if rng is not None:
+        speed = speed + rng.standard_normal(times.size) * (
+            0.3 * how.noise if how.kind in ('rounded', 'lowpass') else how.noise)
+        if how.kind == 'rounded':
+            speed = np.round(speed * radius / how.step) * how.step / radius
+    return counted, speed
+
+
+def gyro_rate(table: Vector, how: Gyro, faults: Faults, times: Vector,
+              rng: Rng | None) -> Vector:
+    """Return the yaw rate [rad/s] that a gyro reads at some times."""
+    seen = through(table, 'yaw_rate', how, times)
+    late = np.clip((times - times[0]) / max(times[-1] - times[0], 1.0), 0.0, 1.0)
+    wrong = seen * faults.gyro_factor + faults.gyro_bias + faults.gyro_drift * late
+    if faults.gyro_clip > 0.0:
+        wrong = np.clip(wrong, -faults.gyro_clip, faults.gyro_clip)
+    seen = np.where(times >= faults.since, wrong, seen)
+    if rng is None:
+        return seen
+    seen = seen + how.bias + rng.standard_normal(times.size) * how.noise
+    return np.round(seen / how.step) * how.step if how.step > 0.0 else seen
+
+
+def through(table: Vector, name: str, how: Gyro, times: Vector) -> Vector:
+    """Return a column of the motion as an inertial unit of this kind passes it on."""
+    values = table[:, COLUMNS.index(name)]
+    if how.kind == 'instant':
+        return np.interp(times, table[:, 0], values)
+    if how.kind == 'mean':
+        return _mean(table, values, how.window, times)
+    return _filtered(table, values, how.window, times)
+
+
+def _ticks(start: float, end: float, rate: float, rng: Rng) -> Vector:
+    """Return sampling times [s]: regular, with the scheduler's own unrest."""
+    times = np.arange(start + rng.uniform(0.0, 1.0 / rate), end, 1.0 / rate)
+    moved = times + rng.uniform(0.0, min(0.1 / rate, 0.001), times.size)
+    result: Vector = moved[moved < end]
+    return result
+
+
+class Clock:
+    """The stamps of one recording: when it was switched on, jitter and lateness."""
+
+    def __init__(self, how: Conventions, faults: Faults, start: float, rng: Rng) -> None:
+        self.how, self.faults, self.start, self.rng = how, faults, start, rng
+
+    def jitter(self, count: int) -> Vector:
+        """Return errors of stamps [s]."""
+        size, form = self.how.jitter, self.how.jitter_form
+        if form == 'uniform':
+            return self.rng.uniform(-size, size, count)
+        if form == 'normal':
+            return self.rng.normal(0.0, 0.5 * size, count)
+        return self.rng.exponential(0.5 * size, count)
+
+    def stamps(self, times: Vector, stream: str, early: float = 0.0) -> Vector:
+        """Return what is written on messages of `times`, `early` seconds before them."""
+        late = self.faults.late_by if self.faults.late == stream else 0.0
+        written = times - early + self.jitter(times.size)
+        written = written + np.where(times >= self.faults.since, late, 0.0) - self.start
+        result: Vector = np.maximum.accumulate(written)
+        return result
+
+
+def publish(table: Vector, sent: Sent, how: Conventions, faults: Faults, start: float,
+            radius: float, rng: Rng) -> Published:
     """
     Return what the robot published while it moved as in `table` (`integrate`).
 
-    Wheel speeds are differences of counted encoder ticks; stamps jitter; the gyro and
-    the accelerometer average the last 10 ms; poses have gaps.
+    Parameters
+    ----------
+    table
+        Its motion.
+    sent
+        Its commands.
+    how
+        The conventions of its log.
+    faults
+        Hidden faults of its sensors.
+    start
+        When the recorder was switched on [s]; stamps count from there.
+    radius
+        Wheel radius by which a driver rounds its speeds [m].
+    rng
+        Where noise comes from.
+
     """
     end = float(table[-1, 0])
-    times = _ticks(end, 50.0, rng)
-    on = times >= senses.since
-    sides = []
-    for side, factor in (('left', senses.encoder_left), ('right', senses.encoder_right)):
-        angle = _at(table, f'angle_{side}', np.concatenate([[times[0] - 0.02], times]))
-        change = np.diff(angle) * np.where(on, factor, 1.0)
-        counted = np.concatenate([[0.0], np.cumsum(change)]) + rng.uniform(0.0, senses.tick)
-        counted = np.floor(counted / senses.tick) * senses.tick
-        speed = np.diff(counted) / np.diff(np.concatenate([[times[0] - 0.02], times]))
-        sides.append((counted[1:], speed))
-    (left, left_speed), (right, right_speed) = sides
-    joints = np.column_stack([
-        _stamps(times, senses, 'wheels', rng), left, right, left, right,
-        left_speed, right_speed, left_speed, right_speed])
-
-    times = _ticks(end, 50.0, rng)
-    on = times >= senses.since
-    rate = _mean_before(table, 'yaw_rate', times, 0.01)
-    faulty = rate * senses.gyro_factor + senses.gyro_bias
-    if senses.gyro_clip > 0.0:
-        faulty = np.clip(faulty, -senses.gyro_clip, senses.gyro_clip)
-    rate = np.where(on, faulty, rate) + senses.nuisance_bias
-    imu = np.column_stack([
-        _stamps(times, senses, 'imu', rng),
-        rate + rng.standard_normal(times.size) * senses.gyro_noise,
-        _mean_before(table, 'accel_x', times, 0.01) + senses.accel_bias
-        + rng.standard_normal(times.size) * senses.accel_noise,
-        _mean_before(table, 'accel_y', times, 0.01)
-        + rng.standard_normal(times.size) * senses.accel_noise])
-
-    times = _ticks(end, senses.pose_rate, rng)
-    poses = np.column_stack([
-        _stamps(times, senses, 'pose', rng),
-        _at(table, 'x', times) + rng.standard_normal(times.size) * senses.pose_noise,
-        _at(table, 'y', times) + rng.standard_normal(times.size) * senses.pose_noise,
-        _at(table, 'heading', times)
-        + rng.standard_normal(times.size) * senses.heading_noise])
-    seen = np.ones(times.size, dtype=bool)
-    for start, length in senses.gaps:
-        seen &= ~((times >= start) & (times < start + length))
-    commands = np.column_stack([drive.times, drive.commands])
-    return Published(commands, joints, imu, poses[seen], senses.stamped, senses.suffix)
+    clock = Clock(how, faults, start, rng)
+    first = max(start, 0.2)
+    joints = imu = poses = np.zeros((0, 9))
+    if 'wheels' not in how.missing:
+        times = _ticks(first, end, how.wheels.rate, rng)
+        columns = [wheel_speeds(table, faulty_angle(table, side, faults), how.wheels, times,
+                                radius, rng) for side in SIDES]
+        (left, left_speed), (right, right_speed) = columns
+        stamps = clock.stamps(times, 'wheels', how.wheels.stamp * how.wheels.window)
+        # The recorder's bag begins with the count at that time, as after any power cycle.
+        joints = np.column_stack([stamps, left, right, left, right, left_speed, right_speed,
+                                  left_speed, right_speed])
+    if 'imu' not in how.missing:
+        times = _ticks(first, end, how.gyro.rate, rng)
+        noise = rng.standard_normal((2, times.size)) * how.gyro.accelerometer
+        imu = np.column_stack([
+            clock.stamps(times, 'imu', how.gyro.stamp * how.gyro.window),
+            gyro_rate(table, how.gyro, faults, times, rng),
+            *(through(table, name, how.gyro, times) + bias + part for name, bias, part in zip(
+                ('accel_x', 'accel_y'), how.gyro.accelerometer_bias, noise, strict=True))])
+    if 'pose' not in how.missing:
+        times = _ticks(first, end, how.poses.rate, rng)
+        seen = np.ones(times.size, dtype=bool)
+        for _ in range(how.poses.gaps):
+            gap = float(rng.uniform(first + 2.0, max(end - 3.0, first + 2.1)))
+            seen &= ~((times >= gap) & (times < gap + float(rng.uniform(0.15, 1.2))))
+        unit = rng.standard_normal((3, times.size))
+        poses = np.column_stack([
+            clock.stamps(times, 'pose'),
+            column(table, 'x', times) + unit[0] * how.poses.noise,
+            column(table, 'y', times) + unit[1] * how.poses.noise,
+            column(table, 'heading', times) + unit[2] * how.poses.heading])[seen]
+    kept = sent.logged & (sent.times >= start)
+    commands = np.column_stack([sent.times - start, sent.commands])[kept]
+    if not how.link.stamped:
+        # The recorder's own clock is all there is.
+        commands[:, 0] = np.maximum.accumulate(commands[:, 0] + clock.jitter(len(commands)))
+    return Published(commands, joints, imu, poses, how.link.stamped, how.wheels.suffix,
+                     velocities=how.wheels.kind != 'positions', positions=how.wheels.positions,
+                     order=how.wheels.order)
 
 
-def ideal(table: Vector, drive: Manoeuvre, senses: Senses, rate: float = 200.0) -> Published:
+def ideal(table: Vector, sent: Sent, how: Conventions, faults: Faults,
+          rate: float = 100.0) -> Published:
     """
-    Return what noiseless sensors would publish at `rate` [Hz]; their faults stay.
+    Return what noiseless sensors would publish at `rate` [Hz]; conventions and faults stay.
 
     It is the yardstick for held-out data: the hidden robot itself, without chance.
     """
-    times = np.arange(0.02, float(table[-1, 0]), 1.0 / rate)
-    late = {name: senses.late_by if senses.late == name else 0.0
-            for name in ('wheels', 'imu', 'pose')}
-    columns = []
-    for side, factor in (('left', senses.encoder_left), ('right', senses.encoder_right)):
-        angle = _at(table, f'angle_{side}', times) * factor
-        before = _at(table, f'angle_{side}', times - 0.02) * factor
-        columns.append((angle, (angle - before) / 0.02))
+    times = np.arange(0.2, float(table[-1, 0]), 1.0 / rate)
+
+    def written(stream: str, early: float = 0.0) -> Vector:
+        return times - early + (faults.late_by if faults.late == stream else 0.0)
+
+    columns = [wheel_speeds(table, faulty_angle(table, side, faults), how.wheels, times, 1.0,
+                            None) for side in SIDES]
     (left, left_speed), (right, right_speed) = columns
-    gyro = _mean_before(table, 'yaw_rate', times, 0.01) * senses.gyro_factor + senses.gyro_bias
-    if senses.gyro_clip > 0.0:
-        gyro = np.clip(gyro, -senses.gyro_clip, senses.gyro_clip)
-    joints = np.column_stack([times + late['wheels'], left, right, left, right,
-                              left_speed, right_speed, left_speed, right_speed])
-    imu = np.column_stack([times + late['imu'], gyro,
-                           _mean_before(table, 'accel_x', times, 0.01),
-                           _mean_before(table, 'accel_y', times, 0.01)])
-    poses = np.column_stack([times + late['pose'], _at(table, 'x', times),
-                             _at(table, 'y', times), _at(table, 'heading', times)])
-    return Published(np.column_stack([drive.times, drive.commands]), joints, imu, poses)
-
-
-def _stamps(times: Vector, senses: Senses, stream: str, rng: np.random.Generator) -> Vector:
-    late = senses.late_by if senses.late == stream else 0.0
-    stamps = times + rng.standard_normal(times.size) * senses.stamp_jitter
-    stamps = stamps + np.where(times >= senses.since, late, 0.0)
-    result: Vector = np.maximum.accumulate(np.maximum(stamps, 0.0))
-    return result
+    joints = np.column_stack([
+        written('wheels', how.wheels.stamp * how.wheels.window), left, right, left, right,
+        left_speed, right_speed, left_speed, right_speed])
+    imu = np.column_stack([written('imu', how.gyro.stamp * how.gyro.window),
+                           gyro_rate(table, how.gyro, faults, times, None),
+                           *(through(table, name, how.gyro, times)
+                             for name in ('accel_x', 'accel_y'))])
+    poses = np.column_stack([written('pose'), *(column(table, name, times)
+                                                for name in ('x', 'y', 'heading'))])
+    return Published(np.column_stack([sent.times, sent.commands]), joints, imu, poses)

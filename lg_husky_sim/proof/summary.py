@@ -1,104 +1,174 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a whole trial: rates with Wilson intervals, medians, the confusion matrix."""
+"""Figures of trials: rates with Wilson intervals, by world and regime, reliability, confusion."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
 
 from lg_husky_sim.proof import catalogue
 from lg_husky_sim.proof.measures import wilson
-from lg_husky_sim.proof.scoring import Judgement
+from lg_husky_sim.proof.scoring import Judgement, Mark
+from lg_husky_sim.proof.settings import settings
 import numpy as np
-from numpy.typing import NDArray
 
-WITH_BASELINE = ('g2', 'g3')
-"""Worlds whose robots are asked what changed since baseline recordings."""
+Cases = Sequence[Judgement]
 
 
 @dataclass(frozen=True)
 class Rate:
-    """A proportion: `hits` of `count`, wanted at least (or, `at_most`, at most) `target`."""
+    """A proportion: `hits` of `count`; `target` is one of `config/blind_trial.yaml` or ''."""
 
     name: str
-    hits: int
+    hits: float
     count: int
-    target: float | None = None
-    at_most: bool = False
+    target: str = ''
 
     @property
-    def value(self) -> float:
-        """The proportion; not a number without any case."""
-        return self.hits / self.count if self.count else math.nan
-
-    @property
-    def reached(self) -> bool | None:
-        """Whether the target is met; None without target or case."""
-        if self.target is None or not self.count:
-            return None
-        return self.value <= self.target if self.at_most else self.value >= self.target
+    def bar(self) -> tuple[float, bool] | None:
+        """The number aimed at, and whether it is an upper one."""
+        numbers: Mapping[str, float] = settings()['targets'].get(self.target, {})
+        for key, at_most in (('least', False), ('most', True)):
+            if key in numbers:
+                return float(numbers[key]), at_most
+        return None
 
     def as_json(self) -> dict[str, Any]:
         """Return the rate with its 95 % interval."""
         low, high = wilson(self.hits, self.count)
-        return {'name': self.name, 'hits': self.hits, 'count': self.count,
-                'value': self.value if self.count else None, 'low': low, 'high': high,
-                'target': self.target, 'at_most': self.at_most, 'reached': self.reached}
+        value = self.hits / self.count if self.count else None
+        bar = self.bar
+        reached = None
+        if bar is not None and value is not None:
+            reached = value <= bar[0] if bar[1] else value >= bar[0]
+        return {'name': self.name, 'hits': self.hits, 'count': self.count, 'value': value,
+                'low': low, 'high': high, 'target': bar[0] if bar else None,
+                'at_most': bool(bar and bar[1]), 'reached': reached}
 
 
-def _rate(name: str, cases: Sequence[Judgement], right: Callable[[Judgement], bool],
-          target: float | None = None, at_most: bool = False) -> Rate:
-    return Rate(name, sum(right(case) for case in cases), len(cases), target, at_most)
+def _rate(name: str, cases: Cases, right: Callable[[Judgement], float | bool],
+          target: str = '') -> Rate:
+    return Rate(name, float(sum(right(case) for case in cases)), len(cases), target)
 
 
-def rates(cases: Sequence[Judgement]) -> tuple[Rate, ...]:
+def _first(case: Judgement) -> Mark:
+    return case.marks[0]
+
+
+def _visible(cases: Cases) -> list[Judgement]:
+    """Return the cases whose effect can be seen, and was missed or claimed for certain."""
+    return [case for case in cases if case.level != 'undetectable'
+            and not (case.level == 'weak' and case.right is None)]
+
+
+def rates(cases: Cases) -> tuple[Rate, ...]:
     """Return all rates of a set of judged cases, with the targets of the project."""
-    singles = [case for case in cases if case.kind == 'single']
-    clear = [case for case in singles if case.severities != ('weak',)]
-    weak = [case for case in singles if case.severities == ('weak',)]
-    clean = [case for case in cases if case.kind == 'clean']
+    singles = _visible([case for case in cases if case.kind == 'single'])
+    strong = [case for case in singles if _first(case).severity != 'weak']
+    clean = [case for case in cases if case.kind == 'none']
     pairs = [case for case in cases if case.kind == 'pair']
     outside = [case for case in cases if case.kind == 'outside']
-    timed = [case for case in singles if case.onset_kind == 'time' and case.top1]
-    placed = [case for case in singles if case.onset_kind == 'place' and case.top1]
-    sided = [case for case in cases if case.side is not None]
-    whole = [case for case in cases if case.onset_kind == 'none' and case.kind != 'clean']
+    changed = [case for case in cases if case.kind == 'before_after']
+    timed = [c for c in singles if _first(c).onset_kind == 'time' and _first(c).outright]
+    placed = [c for c in singles if _first(c).onset_kind == 'place' and _first(c).outright]
+    whole = [c for c in cases if c.claim and c.level != 'clean'
+             and all(mark.onset is None for mark in c.marks)]
+    within = settings()['marks']
     return (
-        _rate('medium and strong: named right', clear, lambda c: c.top1, 0.80),
-        _rate('medium and strong: among the first two or declared inseparable', clear,
-              lambda c: c.top2, 0.92),
-        _rate('medium and strong: the same, or the nearest entry of an "unknown"', clear,
-              lambda c: c.nearest),
-        _rate('medium and strong: subsystem right', clear, lambda c: c.subsystem, 0.92),
-        _rate('weak: named right', weak, lambda c: c.top1),
-        _rate('weak: named right, nothing or unknown, and no wrong name', weak,
-              lambda c: not c.extra and (c.top1 or c.first in ('nothing', 'unknown'))),
-        _rate('medium and strong, named right: another effect named beside',
-              [c for c in clear if c.top1], lambda c: c.extra > 0),
-        _rate('clean: named, called unknown or failed (false alarm)', clean,
-              lambda c: c.verdict != 'nothing_missing', 0.05, at_most=True),
-        _rate('pairs: at least one right', pairs, lambda c: c.found >= 1, 0.90),
-        _rate('pairs: both right', pairs, lambda c: c.found >= 2, 0.60),
-        _rate('pairs: an effect named that is not there', pairs, lambda c: c.extra > 0),
-        _rate('outside the catalogue: unknown, or place right without a confident name',
-              outside, lambda c: c.acceptable, 0.80),
-        _rate('outside the catalogue: noticed', outside,
-              lambda c: c.verdict in ('known', 'unknown')),
-        _rate('side right where one side is hit and its effect named', sided,
-              lambda c: bool(c.side)),
+        _rate('single effects: named right', singles, lambda c: _first(c).outright, 'singles'),
+        _rate('single effects: with half marks for related names', singles,
+              lambda c: _first(c).named),
+        _rate('medium and strong: named right', strong, lambda c: _first(c).outright, 'clear'),
+        _rate('single effects: among the first two or declared inseparable', singles,
+              lambda c: _first(c).considered, 'first_two'),
+        _rate('single effects: part right', singles, lambda c: _first(c).part, 'part'),
+        _rate('single effects: called unknown', singles, lambda c: c.first == 'unknown',
+              'known_called_unknown'),
+        _rate('single effects, named right: another effect named beside',
+              [c for c in singles if _first(c).outright], lambda c: c.extra > 0),
+        _rate('clean robots: named, called unknown or failed (false alarm)', clean,
+              lambda c: c.claim or bool(c.failed), 'false_alarms'),
+        _rate('pairs: at least one right', pairs,
+              lambda c: any(mark.named == 1.0 for mark in c.marks), 'pair_one'),
+        _rate('pairs: both right', pairs, lambda c: c.right or 0.0, 'pair_both'),
+        _rate('outside the catalogue: unknown, or part right', outside,
+              lambda c: c.acceptable, 'outside'),
+        _rate('what changed: named right', [c for c in changed if c.level != 'clean'],
+              lambda c: c.right or 0.0, 'changed'),
+        _rate('what changed: an unchanged robot flagged',
+              [c for c in changed if c.level == 'clean'],
+              lambda c: c.claim or bool(c.failed), 'unchanged'),
+        _rate('side right where one side is hit and its effect named',
+              [c for c in singles if _first(c).side is not None],
+              lambda c: bool(_first(c).side)),
         _rate('onset in time within 0.5 s (effect named right)', timed,
-              lambda c: (c.onset_error or 0.0) <= 0.5, 0.50),
-        _rate('onset in time within 2 s (effect named right)', timed,
-              lambda c: (c.onset_error or 0.0) <= 2.0, 0.90),
-        _rate('onset at a place within 0.5 m (effect named right)', placed,
-              lambda c: (c.onset_error or 0.0) <= 0.5),
-        _rate('an onset said where there is none', whole, lambda c: c.onset_invented),
-        _rate('no diagnosis, or no drive of its model (error)', cases,
-              lambda c: bool(c.failed), 0.0, at_most=True),
+              lambda c: (_first(c).onset or 0.0) <= 0.5, 'onset_half_second'),
+        _rate(f'onset in time within {within["onset_s"]:g} s (effect named right)', timed,
+              lambda c: (_first(c).onset or 0.0) <= within['onset_s'], 'onset_two_seconds'),
+        _rate(f'onset at a place within {within["onset_m"]:g} m (effect named right)', placed,
+              lambda c: (_first(c).onset or 0.0) <= within['onset_m'], 'onset_place'),
+        _rate('an onset said where there is none', whole, lambda c: c.onset_invented,
+              'onset_invented'),
+        _rate('effects that hardly show: nothing, or not for certain, or the right name',
+              [c for c in cases if c.level == 'undetectable'],
+              lambda c: c.timid or c.acceptable),
+        _rate('no diagnosis (error)', cases, lambda c: bool(c.failed), 'failed'),
     )
+
+
+def reliability(cases: Cases) -> dict[str, Any]:
+    """
+    Return stated confidence against share right in bins, and the calibration error.
+
+    The expected calibration error is the mean over cases of |confidence - share right| of
+    their bin (Guo and others, On calibration of modern neural networks, ICML 2017).
+    """
+    number = int(settings()['marks']['bins'])
+    bins: dict[int, list[tuple[float, float]]] = {}
+    for case in cases:
+        if case.confidence is not None and case.right is not None:
+            k = min(int(case.confidence * number), number - 1)
+            bins.setdefault(k, []).append((case.confidence, case.right))
+    total = sum(len(rows) for rows in bins.values())
+    table = []
+    error = 0.0
+    for k in sorted(bins):
+        stated, right = (math.fsum(row[j] for row in bins[k]) for j in (0, 1))
+        error += abs(stated - right)
+        low, high = wilson(right, len(bins[k]))
+        table.append({'from': k / number, 'to': (k + 1) / number, 'count': len(bins[k]),
+                      'stated': stated / len(bins[k]), 'right': right / len(bins[k]),
+                      'low': low, 'high': high})
+    means = {}
+    for name, wanted in (('right', 1.0), ('wrong', 0.0)):
+        values = [c for rows in bins.values() for c, r in rows if r == wanted]
+        means[name] = sum(values) / len(values) if values else None
+    return {'bins': table, 'cases': total, 'error': error / total if total else None,
+            'mean_when_right': means['right'], 'mean_when_wrong': means['wrong'],
+            'target': float(settings()['targets']['calibration_error']['most'])}
+
+
+def by_regime(cases: Cases) -> list[dict[str, Any]]:
+    """Return, for each axis and family, singles named right and clean robots flagged."""
+    groups: dict[tuple[str, str], list[Judgement]] = {}
+    for case in cases:
+        groups.setdefault(('world', case.world), []).append(case)
+        for axis, family in case.regime.items():
+            groups.setdefault((axis, family), []).append(case)
+        for family in case.unseen or ('none of them',):
+            groups.setdefault(('left out of tuning', family), []).append(case)
+    result = []
+    for (axis, family), chosen in sorted(groups.items()):
+        named = _rate('named', _visible([c for c in chosen if c.kind == 'single']),
+                      lambda c: _first(c).outright)
+        alarms = _rate('alarms', [c for c in chosen if c.level == 'clean'],
+                       lambda c: c.claim or bool(c.failed))
+        result.append({'axis': axis, 'family': family, 'named': named.as_json(),
+                       'alarms': alarms.as_json()})
+    return result
 
 
 def _quantiles(values: Sequence[float]) -> dict[str, Any]:
@@ -109,91 +179,61 @@ def _quantiles(values: Sequence[float]) -> dict[str, Any]:
             'upper_quartile': high}
 
 
-def shares(cases: Sequence[Judgement]) -> dict[str, Any]:
-    """
-    Return medians and quartiles of the share of the achievable improvement.
-
-    Against a baseline the share also counts what the diagnosis learnt of the base beforehand,
-    which the plain model does not have: these cases stand apart, with the clean ones.
-    """
+def shares(cases: Cases) -> dict[str, Any]:
+    """Return medians and quartiles of the share of the achievable improvement."""
     result = {}
-    alone = [c for c in cases if c.world not in WITH_BASELINE]
-    against = [c for c in cases if c.world in WITH_BASELINE]
     for name in ('all', 'position_m'):
-        for label, chosen in (
-                ('known effects', [c for c in alone if c.kind in ('single', 'pair')]),
-                ('outside the catalogue', [c for c in alone if c.kind == 'outside']),
-                ('against a baseline', [c for c in against if c.kind != 'clean']),
-                ('against a baseline, clean', [c for c in against if c.kind == 'clean'])):
-            values = [value for c in chosen if (value := c.shares.get(name)) is not None]
+        for label, kinds in (('known effects', ('single', 'pair')),
+                             ('outside the catalogue', ('outside',))):
+            values = [value for c in cases if c.kind in kinds
+                      and (value := c.shares.get(name)) is not None]
             result[f'{label}, {name}'] = _quantiles(values)
     return result
 
 
-def seconds(cases: Sequence[Judgement]) -> dict[str, Any]:
-    """Return median and quartiles of the run time [s], and the longest."""
-    values = [case.seconds for case in cases if math.isfinite(case.seconds)]
-    return {**_quantiles(values), 'longest': max(values) if values else None}
-
-
-def by_effect(cases: Sequence[Judgement]) -> dict[str, Any]:
-    """
-    Return, for each hidden effect alone, how often it was named right and as what else.
-
-    The median share is that of the robots that come without a baseline.
-    """
+def by_effect(cases: Cases) -> dict[str, Any]:
+    """Return, for each effect alone, how often it was named right and as what else."""
     result: dict[str, Any] = {}
     for case in cases:
-        if case.kind not in ('single', 'outside'):
+        if len(case.marks) != 1:
             continue
-        row = result.setdefault(case.effects[0], {
-            'count': 0, 'right': 0, 'subsystem': 0, 'named': {}, 'shares': []})
+        one = _first(case)
+        row = result.setdefault(one.effect, {'count': 0, 'right': 0, 'part': 0, 'named': {}})
         row['count'] += 1
-        row['right'] += case.top1
-        row['subsystem'] += case.subsystem
+        row['right'] += one.outright
+        row['part'] += one.part
         row['named'][case.first] = row['named'].get(case.first, 0) + 1
-        if case.shares.get('all') is not None and case.world not in WITH_BASELINE:
-            row['shares'].append(case.shares['all'])
-    for row in result.values():
-        row['median_share'] = float(np.median(row['shares'])) if row['shares'] else None
-        del row['shares']
     return dict(sorted(result.items()))
 
 
-def confusion(cases: Sequence[Judgement]) -> tuple[list[str], list[str], NDArray[np.int64]]:
-    """
-    Return rows (hidden), columns (named first) and counts of the confusion matrix.
-
-    Pairs are left out; the last columns are 'unknown', 'nothing' and 'failed'.
-    """
-    order = list(catalogue.SUBSYSTEM)
-    hidden = {case.effects[0] if case.effects else 'clean'
-              for case in cases if case.kind != 'pair'}
-    rows = [name for name in order if name in hidden]
-    rows += ['clean'] * ('clean' in hidden)
-    rows += [name for name in catalogue.OUTSIDE if name in hidden]
-    columns = [*order, 'unknown', 'nothing', 'failed']
-    counts = np.zeros((len(rows), len(columns)), dtype=np.int64)
-    for case in cases:
-        if case.kind == 'pair':
-            continue
-        row = rows.index(case.effects[0] if case.effects else 'clean')
-        first = case.first if case.first in columns else 'failed'
-        counts[row, columns.index(first)] += 1
-    return rows, columns, counts
+def confusion(cases: Cases) -> dict[str, Any]:
+    """Return counts of what was named first (columns) for each effect alone (rows)."""
+    alone = [case for case in cases if case.kind in ('single', 'outside', 'none')]
+    known = list(catalogue.SUBSYSTEM)
+    hidden = {_first(case).effect if case.marks else 'clean' for case in alone}
+    rows = [name for name in (*known, *sorted(hidden - {*known, 'clean'}), 'clean')
+            if name in hidden]
+    said = {case.first for case in alone}
+    columns = [name for name in (*known, *sorted(said - {*known, 'nothing', 'unknown', 'failed'}),
+                                 'unknown', 'nothing', 'failed') if name in said]
+    counts = np.zeros((len(rows), len(columns)), dtype=int)
+    for case in alone:
+        counts[rows.index(_first(case).effect if case.marks else 'clean'),
+               columns.index(case.first)] += 1
+    return {'hidden': rows, 'named': columns, 'counts': counts.tolist()}
 
 
-def summarise(cases: Sequence[Judgement]) -> dict[str, Any]:
-    """Return everything that the page and the results file say, as JSON's own types."""
-    rows, columns, counts = confusion(cases)
+def summarise(cases: Cases) -> dict[str, Any]:
+    """Return all figures of a set of judged cases, as plain data."""
     worlds = sorted({case.world for case in cases})
+    seconds = [case.seconds for case in cases if case.seconds > 0.0]
     return {
         'cases': len(cases),
         'kinds': {kind: sum(case.kind == kind for case in cases)
-                  for kind in ('single', 'pair', 'clean', 'outside')},
+                  for kind in ('single', 'pair', 'none', 'outside', 'before_after')},
         'rates': [rate.as_json() for rate in rates(cases)],
         'by_world': {world: [rate.as_json() for rate in rates(
             [case for case in cases if case.world == world])] for world in worlds},
-        'shares': shares(cases), 'seconds': seconds(cases), 'by_effect': by_effect(cases),
-        'confusion': {'hidden': rows, 'named': columns, 'counts': counts.tolist()},
-    }
+        'by_regime': by_regime(cases), 'reliability': reliability(cases),
+        'shares': shares(cases), 'by_effect': by_effect(cases), 'confusion': confusion(cases),
+        'seconds': {**_quantiles(seconds), 'longest': max(seconds, default=None)}}

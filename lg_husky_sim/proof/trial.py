@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 import json
@@ -18,9 +18,8 @@ import time
 from typing import Any
 
 from lg_husky_sim.errors import CommandError, LgHuskyError, RecordingError
-from lg_husky_sim.proof import bags, measures, plain
+from lg_husky_sim.proof import bags, measures, outcomes, plain
 from lg_husky_sim.proof.cases import generate, NoTraceError, Spec
-from lg_husky_sim.proof.scoring import judge, Judgement
 from lg_husky_sim.proof.sealing import unseal, write_json
 
 TRIES = 100
@@ -38,19 +37,24 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Folders:
-    """Where a trial keeps its parts; a diagnosis is given paths below `cases` only."""
+    """
+    Where a trial keeps its parts; a diagnosis is given paths below `cases` only.
+
+    `cases_of`: another folder with `cases` and `answers` that somebody else has made.
+    """
 
     root: Path
+    cases_of: Path | None = None
 
     @property
     def cases(self) -> Path:
         """Recordings, one folder a case."""
-        return self.root / 'cases'
+        return (self.cases_of or self.root) / 'cases'
 
     @property
     def answers(self) -> Path:
         """Sealed answers."""
-        return self.root / 'answers'
+        return (self.cases_of or self.root) / 'answers'
 
     @property
     def held_out(self) -> Path:
@@ -66,6 +70,11 @@ class Folders:
     def commitments(self) -> Path:
         """Commitments to the answers."""
         return self.root / 'commitments.json'
+
+    @property
+    def outcomes(self) -> Path:
+        """One JSON line a case."""
+        return self.root / 'outcomes.jsonl'
 
 
 def name_of(index: int) -> str:
@@ -86,21 +95,22 @@ def keep_plan(folders: Folders, specs: Sequence[Spec]) -> None:
     path = folders.root / 'plan.json'
     plan = json.loads(json.dumps([asdict(spec) for spec in specs]))
     if path.exists():
-        if json.loads(path.read_text()) != plan:
+        if json.loads(path.read_text(encoding='utf-8')) != plan:
             raise CommandError(f'{folders.root} holds another trial; choose an empty folder')
         return
     write_json(path, plan)
 
 
-def _generate(spec: Spec, name: str, folders: Folders) -> tuple[str, str]:
+def _generate(spec: Spec, name: str, folders: Folders, held_out: bool) -> tuple[str, str]:
     for again in range(TRIES):
         try:
-            return name, generate(replace(spec, seed=spec.seed + again * REDRAWN), name,
-                                  folders.cases, folders.answers, folders.held_out)
+            return name, generate(
+                replace(spec, seed=spec.seed + again * REDRAWN), name, folders.cases,
+                folders.answers, folders.held_out if held_out else None)
         except (FloatingPointError, NoTraceError) as error:
             # This draw drives the robot out of its bounds, or its drives cannot show the effect:
             # take the next, the same for everyone; another effect where none can be seen.
-            if isinstance(error, NoTraceError):
+            if isinstance(error, NoTraceError) and again % 5 == 4:
                 spec = replace(spec, effects=(), onset='')
             for place in (folders.cases, folders.held_out):
                 shutil.rmtree(place / name, ignore_errors=True)
@@ -108,8 +118,8 @@ def _generate(spec: Spec, name: str, folders: Folders) -> tuple[str, str]:
                        'and shows its effect')
 
 
-def prepare(folders: Folders, specs: Sequence[Spec], jobs: int,
-            done: Progress) -> dict[str, str]:
+def prepare(folders: Folders, specs: Sequence[Spec], jobs: int, done: Progress,
+            held_out: bool = True) -> dict[str, str]:
     """
     Generate and seal all cases that are not there yet; return the commitments by case.
 
@@ -117,45 +127,60 @@ def prepare(folders: Folders, specs: Sequence[Spec], jobs: int,
     """
     sealed: dict[str, str] = {}
     if folders.commitments.exists():
-        sealed = json.loads(folders.commitments.read_text())
+        sealed = json.loads(folders.commitments.read_text(encoding='utf-8'))
     missing = [(spec, name_of(k)) for k, spec in enumerate(specs)
                if name_of(k) not in sealed]
     for _ in range(len(specs) - len(missing)):
         done('')
     if not missing:
         return sealed
-    for name, commitment in _made(folders, missing, jobs):
+    for name, commitment in _made(folders, missing, jobs, held_out):
         sealed[name] = commitment
         write_json(folders.commitments, sealed)
         done(name)
     return sealed
 
 
-def _made(folders: Folders, missing: Sequence[tuple[Spec, str]],
-          jobs: int) -> Iterator[tuple[str, str]]:
+def _made(folders: Folders, missing: Sequence[tuple[Spec, str]], jobs: int,
+          held_out: bool) -> Iterator[tuple[str, str]]:
     """Generate cases, in this process with one job; yield names and commitments."""
     if jobs == 1 or len(missing) == 1:
         for spec, name in missing:
-            yield _generate(spec, name, folders)
+            yield _generate(spec, name, folders, held_out)
         return
     pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context('spawn'))
     try:
-        waiting = [pool.submit(_generate, spec, name, folders) for spec, name in missing]
+        waiting = [pool.submit(_generate, spec, name, folders, held_out)
+                   for spec, name in missing]
         for future in as_completed(waiting):
             yield future.result()
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def command_for(folders: Folders, name: str, out: Path) -> list[str]:
-    """Return the command line that diagnoses one case; it names recordings and nothing else."""
+def command_for(folders: Folders, name: str, out: Path, told: Mapping[str, Any]) -> list[str]:
+    """
+    Return the command line that diagnoses one case; it names recordings and two lengths.
+
+    Parameters
+    ----------
+    folders, name
+        The case.
+    out
+        Where the diagnosis writes.
+    told
+        'wheel_radius_m' and 'track_m', as measured with a ruler.
+
+    """
     case = folders.cases / name
-    command = [sys.executable, '-m', 'lg_husky_sim.cli.main', 'diagnose',
-               *(str(path) for path in sorted((case / 'recordings').iterdir())),
-               '--out', str(out), '--seed', '0', '--jobs', '1', '--no-report']
-    if (case / 'baseline').exists():
-        for path in sorted((case / 'baseline').iterdir()):
-            command += ['--baseline', str(path)]
+    before = sorted((case / 'before').glob('rec*')) if (case / 'before').is_dir() else []
+    given = sorted((case / 'after' if before else case).glob('rec*'))
+    command = [sys.executable, '-m', 'lg_husky_sim.cli.main', 'diagnose', *map(str, given),
+               '--out', str(out), '--seed', '1', '--jobs', '1', '--no-report',
+               '--set', f'wheel_radius={told["wheel_radius_m"]}',
+               '--set', f'track={told["track_m"]}']
+    for path in before:
+        command += ['--baseline', str(path)]
     return command
 
 
@@ -195,25 +220,28 @@ def diagnose(folders: Folders, name: str) -> dict[str, Any]:
     out = folders.runs / name
     path = out / 'outcome.json'
     if path.exists():
-        outcome: dict[str, Any] = json.loads(path.read_text())
+        outcome: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
         return outcome
     out.mkdir(parents=True, exist_ok=True)
     work = out / 'diagnosis'
     if work.exists():
         shutil.rmtree(work)
+    # What a ruler says of a robot is no secret; nothing else of the answer is read here.
+    told = json.loads((folders.answers / f'{name}.json').read_text(encoding='utf-8'))['robot']
     start = time.monotonic()
-    code, error = _run(command_for(folders, name, work))
+    code, error = _run(command_for(folders, name, work, told))
     seconds = time.monotonic() - start
     diagnosis = None
     if code == 0:
         try:
-            diagnosis = json.loads((work / 'diagnosis.json').read_text())
+            diagnosis = json.loads((work / 'diagnosis.json').read_text(encoding='utf-8'))
             error = ''
         except (OSError, ValueError) as problem:
             error = f'diagnosis.json cannot be read: {problem}'
+    error = error or (f'exit code {code}' if code else '')
     outcome = {'case': name, 'exit_code': code, 'error': error, 'seconds': seconds,
                'diagnosis': diagnosis, 'held_out': []}
-    if diagnosis is not None:
+    if diagnosis is not None and (folders.held_out / name).is_dir():
         outcome['held_out'], problem_line = _hold_out(folders, name, work / 'model.yaml')
         outcome['held_out_error'] = problem_line
     write_json(path, outcome)
@@ -229,8 +257,7 @@ def _hold_out(folders: Folders, name: str, model: Path) -> tuple[list[Any], str]
 
 
 def _measured(folders: Folders, name: str, model: Path) -> tuple[list[Any], str]:
-    train = [bags.read_bag(path)
-             for path in sorted((folders.cases / name / 'recordings').iterdir())]
+    train = [bags.read_bag(path) for path in sorted((folders.cases / name).glob('rec*'))]
     parameters = plain.calibrate(train)
     rows = []
     for held in sorted((folders.held_out / name).glob('held*')):
@@ -281,10 +308,10 @@ def diagnosed(folders: Folders, names: Sequence[str]) -> list[str]:
     return done
 
 
-def open_and_judge(folders: Folders, sealed: dict[str, str],
-                   names: Sequence[str]) -> tuple[Judgement, ...]:
+def opened(folders: Folders, sealed: Mapping[str, str],
+           names: Sequence[str]) -> list[dict[str, Any]]:
     """
-    Open the answers, check each against its commitment, and judge.
+    Open the answers, check each against its commitment, and return the outcomes' lines.
 
     Raises
     ------
@@ -298,34 +325,48 @@ def open_and_judge(folders: Folders, sealed: dict[str, str],
         if not path.exists():
             raise LgHuskyError(f'{name} has no outcome yet')
         answer = unseal(folders.answers / f'{name}.json', sealed[name])
-        result.append(judge(answer, json.loads(path.read_text())))
-    return tuple(result)
+        result.append(outcomes.line_of(answer, json.loads(path.read_text(encoding='utf-8'))))
+    return result
 
 
-def scored(root: Path) -> tuple[tuple[Judgement, ...], dict[str, Any]]:
+def given(cases_of: Path) -> tuple[dict[str, str], str]:
     """
-    Judge a trial again that was scored before, to be put together with others.
+    Return the commitments of cases that are there already, and which set they are.
 
-    Returns
-    -------
-    tuple of Judgement
-        Of all its diagnosed cases.
-    dict
-        'command', 'planned', 'seal', 'first_seed' and 'last_seed' of its results, and 'cases'.
+    Opened cases of others are 'validation', those of this generator 'tuning'.
 
     Raises
     ------
     LgHuskyError
-        The folder holds no scored trial.
+        The folder has no such cases.
 
     """
-    folders, path = Folders(root), root / 'results.json'
+    from lg_husky_sim.proof.sealing import commitment
     try:
-        results = json.loads(path.read_text())
-        sealed = json.loads(folders.commitments.read_text())
-        facts = {name: results[name] for name in (
-            'command', 'planned', 'seal', 'first_seed', 'last_seed')}
-    except (OSError, ValueError, KeyError) as error:
-        raise LgHuskyError(f'{root} holds no scored trial: {error}') from error
-    judged = open_and_judge(folders, sealed, diagnosed(folders, list(sealed)))
-    return judged, {**facts, 'cases': len(judged)}
+        answers = {path.stem: json.loads(path.read_text(encoding='utf-8'))
+                   for path in sorted((cases_of / 'answers').glob('*.json'))
+                   if (cases_of / 'cases' / path.stem).is_dir()}
+    except (OSError, ValueError) as error:
+        raise LgHuskyError(f'{cases_of}: an answer cannot be read: {error}') from error
+    if not answers:
+        raise LgHuskyError(f'{cases_of} has no cases with answers (cases/ID, answers/ID.json)')
+    ours = all('spec' in answer for answer in answers.values())
+    return ({name: commitment(answer) for name, answer in answers.items()},
+            'tuning' if ours else 'validation')
+
+
+def commit() -> str:
+    """Return the commit of the source tree that is tried, or the version of what is installed."""
+    from importlib.metadata import PackageNotFoundError, version
+    root = Path(__file__).resolve().parents[2]
+    git = shutil.which('git')
+    if git is not None and (root / '.git').exists():
+        asked = subprocess.run(  # noqa: S603 (our own command line)
+            [git, '-C', str(root), 'describe', '--always', '--dirty', '--abbrev=12'],
+            capture_output=True, text=True, check=False)
+        if asked.returncode == 0:
+            return asked.stdout.strip()
+    try:
+        return f'version {version("lg_husky_sim")}'
+    except PackageNotFoundError:
+        return 'unknown'

@@ -1,154 +1,167 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Judging a diagnosis against its answer, and the figures of many judgements."""
+"""Marking what was said against what is true, and the figures of many marks."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from lg_husky_sim.proof import measures, summary
+from lg_husky_sim.proof import catalogue, measures, summary
+from lg_husky_sim.proof.outcomes import line_of
 from lg_husky_sim.proof.page import page_of, text_of
-from lg_husky_sim.proof.scoring import judge
+from lg_husky_sim.proof.scoring import judge, Judgement
+from lg_husky_sim.proof.settings import settings
 import numpy as np
 import pytest
 
 
 def answer(*effects: str, kind: str = 'single', onset: dict[str, Any] | None = None,
-           severity: str = 'medium', side: str = 'none') -> dict[str, Any]:
-    return {'case': 'case_0001', 'spec': {'kind': kind, 'world': 'g1', 'drive': 'paper'},
-            'effects': [{'effect': name, 'severity': severity, 'side': side}
-                        for name in effects],
-            'onset': onset or {'kind': 'none'}}
+           level: str = 'clear', side: str = 'both', severity: str = 'medium') -> dict[str, Any]:
+    part = {**catalogue.SUBSYSTEM, **catalogue.OUTSIDE}
+    return {
+        'kind': kind if effects or kind == 'before_after' else 'none',
+        'level': level if effects else 'clean', 'world': 'open loop, fine steps',
+        'regime': {'floor': 'smooth'}, 'unseen': [],
+        'answers': [{
+            'effect': name, 'in_list': name in catalogue.SUBSYSTEM, 'severity': severity,
+            'side': side, 'onset': onset, 'location': {'subsystem': part[name]},
+            'related_answers': settings()['effects'][name]['related']} for name in effects]}
 
 
-def finding(effect: str, subsystem: str, **more: Any) -> dict[str, Any]:
-    return {'effect': effect, 'subsystem': subsystem, 'side': 'none',
-            'onset': {'kind': 'none'}, 'rivals': [], **more}
+def finding(effect: str, subsystem: str = '', gain: float = 50.0, **more: Any) -> dict[str, Any]:
+    part = subsystem or catalogue.SUBSYSTEM.get(effect, '')
+    return {'effect': effect, 'subsystem': part, 'side': 'both', 'onset': {'kind': 'none'},
+            'rivals': [], 'evidence': {'held_out_gain_nats': gain}, **more}
 
 
-def outcome(verdict: str, *findings: dict[str, Any], confidence: float = 0.99,
+def outcome(*findings: dict[str, Any], confidence: float = 0.99, verdict: str = '',
             inseparable: list[str] | None = None) -> dict[str, Any]:
-    return {'seconds': 4.0, 'error': '', 'held_out': [], 'diagnosis': {
+    verdict = verdict or ('known' if findings else 'nothing_missing')
+    return {'case': 'case_0001', 'seconds': 4.0, 'error': '', 'held_out': [], 'diagnosis': {
         'verdict': verdict, 'confidence': confidence, 'findings': list(findings),
         'indistinguishable': [{'effects': inseparable}] if inseparable else []}}
 
 
-def test_the_right_name_scores_in_every_way() -> None:
-    one = judge(answer('slope'), outcome('known', finding('slope', 'translation')))
-    assert (one.top1, one.top2, one.subsystem, one.found, one.extra) == (True, True, True, 1, 0)
-    assert one.first == 'slope'
+CRASH: dict[str, Any] = {'case': 'a', 'diagnosis': None, 'error': 'error: no wheels',
+                         'held_out': []}
 
 
-def test_a_wrong_name_scores_its_subsystem_only() -> None:
-    one = judge(answer('slope'), outcome('known', finding('payload', 'translation')))
-    assert (one.top1, one.top2, one.subsystem, one.found, one.extra) == (False, False, True, 0, 1)
+def marked(truth: dict[str, Any], said: dict[str, Any]) -> Judgement:
+    return judge(line_of(truth, said))
 
 
-def test_the_best_rival_counts_as_second() -> None:
+def test_the_right_name_is_right_in_every_way() -> None:
+    one = marked(answer('slope'), outcome(finding('slope')))
+    (mark,) = one.marks
+    assert (mark.named, mark.outright, mark.considered, mark.part) == (1.0, True, True, True)
+    assert (one.right, one.extra, one.first) == (1.0, 0, 'slope')
+
+
+def test_a_related_name_is_worth_half_and_a_declared_tie_makes_it_whole() -> None:
+    truth, said = answer('slope'), finding('rolling_resistance')
+    assert marked(truth, outcome(said)).marks[0].named == 0.5
+    tied = marked(truth, outcome(said, inseparable=['slope', 'rolling_resistance']))
+    assert tied.marks[0].named == 1.0
+    assert not tied.marks[0].outright
+    far = outcome(finding('gyro_bias'), inseparable=['slope', 'gyro_bias'])
+    assert marked(truth, far).marks[0].named == 0.5
+    crowd = outcome(finding('gyro_bias'), inseparable=['slope', 'gyro_bias', 'payload',
+                                                       'yaw_pull', 'battery_sag'])
+    assert marked(truth, crowd).marks[0].named == 0.0, 'a group of five says nothing'
+
+
+def test_only_the_best_rival_counts_as_second() -> None:
     rivals = [{'effect': 'gyro_bias', 'held_out_gain_nats': 3.0},
               {'effect': 'slope', 'held_out_gain_nats': 90.0}]
-    wrong = finding('quadratic_drag', 'translation', rivals=rivals)
-    assert judge(answer('slope'), outcome('known', wrong)).top2
-    assert not judge(answer('gyro_bias'), outcome('known', wrong)).top2
+    wrong = finding('payload', rivals=rivals)
+    assert marked(answer('slope'), outcome(wrong)).marks[0].considered
+    assert not marked(answer('gyro_bias'), outcome(wrong)).marks[0].considered
 
 
-def test_of_names_only_two_count_and_of_an_unknown_none() -> None:
-    rivals = [{'effect': 'slope', 'held_out_gain_nats': 90.0}]
-    wrong = finding('quadratic_drag', 'translation', rivals=rivals)
-    assert not judge(answer('slope'), outcome('known', wrong, finding(
-        'payload', 'translation'))).top2
-    assert judge(answer('slope'), outcome('known', wrong, finding('slope', 'translation'))).top2
-    nameless = judge(answer('slope'), outcome('unknown', finding(
-        'unknown', 'translation', rivals=rivals)))
-    assert (nameless.top1, nameless.top2, nameless.nearest) == (False, False, True)
+def test_nothing_is_right_on_clean_robots_and_only_there() -> None:
+    assert marked(answer(), outcome()).right == 1.0
+    assert marked(answer(), outcome(finding('slope'))).right == 0.0
+    assert marked(answer('slope'), outcome()).right == 0.0
 
 
-def test_a_declared_inseparable_pair_counts_as_second() -> None:
-    said = finding('encoder_scale', 'sensor')
-    truth = answer('wheel_radius_mismatch')
-    assert not judge(truth, outcome('known', said)).top2
-    assert judge(truth, outcome('known', said, inseparable=[
-        'encoder_scale', 'wheel_radius_mismatch'])).top2
-    assert not judge(truth, outcome('known', said, inseparable=[
-        'slope', 'wheel_radius_mismatch'])).top2
-
-
-def test_nothing_is_right_on_clean_and_only_there() -> None:
-    clean = judge(answer(kind='clean'), outcome('nothing_missing'))
-    assert (clean.first, clean.verdict) == ('nothing', 'nothing_missing')
-    assert not judge(answer('slope'), outcome('nothing_missing')).top2
+@pytest.mark.parametrize('level', ['weak', 'undetectable'])
+def test_caution_where_hardly_anything_shows_does_not_count_against(level: str) -> None:
+    truth = answer('slope', level=level)
+    assert marked(truth, outcome()).right is None
+    assert marked(truth, outcome(finding('payload'), confidence=0.5)).right is None
+    assert marked(truth, outcome(finding('payload'), confidence=0.9)).right == 0.0
+    assert marked(truth, outcome(finding('slope'), confidence=0.9)).right == 1.0
 
 
 @pytest.mark.parametrize(('said', 'acceptable'), [
-    (outcome('unknown', finding('unknown', 'drivetrain')), True),
-    (outcome('known', finding('payload', 'translation'), confidence=0.6), True),
-    (outcome('known', finding('payload', 'translation'), confidence=0.95), False),
-    (outcome('known', finding('gyro_bias', 'sensor'), confidence=0.6), False),
-    (outcome('nothing_missing'), False),
-    ({'diagnosis': None, 'error': 'crashed', 'held_out': []}, False)])
+    (outcome(finding('unknown', 'drivetrain'), verdict='unknown'), True),
+    (outcome(finding('payload')), True), (outcome(finding('gyro_bias')), False),
+    (outcome(), False),
+    ({'case': 'a', 'diagnosis': None, 'error': 'crashed', 'held_out': []}, False)])
 def test_an_effect_outside_the_catalogue_wants_humility(said: dict[str, Any],
                                                         acceptable: bool) -> None:
-    assert judge(answer('wind_gusts', kind='outside'), said).acceptable is acceptable
+    one = marked(answer('wind_gusts', kind='outside'), said)
+    assert one.acceptable is acceptable
+    assert one.right == float(acceptable)
+
+
+def test_unknown_is_no_name_for_a_known_effect() -> None:
+    one = marked(answer('slope'), outcome(finding('unknown', 'translation'), verdict='unknown'))
+    assert (one.marks[0].named, one.right, one.first) == (0.0, 0.0, 'unknown')
 
 
 def test_a_crash_is_a_failure_and_never_right() -> None:
-    one = judge(answer('slope'), {'diagnosis': None, 'error': 'error: no wheels', 'held_out': []})
-    assert (one.first, one.failed, one.top2) == ('failed', 'error: no wheels', False)
-    assert math.isnan(one.seconds)
+    one = marked(answer('slope'), CRASH)
+    assert (one.first, one.failed, one.right) == ('failed', 'error: no wheels', 0.0)
     assert one.shares == {'all': 0.0, 'position_m': 0.0}
+    clean = marked(answer(), CRASH)
+    rates = {rate.name: rate for rate in summary.rates([clean])}
+    assert rates['clean robots: named, called unknown or failed (false alarm)'].hits == 1
+    assert rates['no diagnosis (error)'].as_json()['reached'] is False
 
 
-def test_a_model_that_cannot_be_driven_is_a_failure_too() -> None:
-    said = {**outcome('known', finding('slope', 'translation')), 'held_out_error': 'simulate: no'}
-    one = judge(answer('slope'), said)
-    assert (one.failed, one.top1, one.shares['all']) == ('simulate: no', True, 0.0)
-    (rate,) = [r for r in summary.rates([one]) if r.name.startswith('no diagnosis')]
-    assert (rate.hits, rate.reached) == (1, False)
-
-
-def test_a_crash_on_a_clean_robot_is_a_false_alarm() -> None:
-    crashed = judge(answer(kind='clean'), {'diagnosis': None, 'error': 'crashed', 'held_out': []})
-    fine = judge(answer(kind='clean'), outcome('nothing_missing'))
-    (rate,) = [r for r in summary.rates([crashed, fine]) if 'false alarm' in r.name]
-    assert (rate.hits, rate.count) == (1, 2)
+def test_a_crash_is_not_caution_either() -> None:
+    assert marked(answer('slope', level='weak'), CRASH).right == 0.0
 
 
 @pytest.mark.parametrize(('said', 'error'), [
-    ({'kind': 'time', 'recording': 'rec2', 'time_s': 12.7}, 0.7),
-    ({'kind': 'time', 'recording': 'folder/rec2', 'time_s': 12.7}, 0.7),
+    ({'kind': 'time', 'recording': 'rec2', 'time_s': 12.4}, 0.4),
+    ({'kind': 'time', 'recording': 'some/where/rec2', 'time_s': 11.0}, 1.0),
     ({'kind': 'time', 'recording': 'rec1', 'time_s': 12.0}, math.inf),
     ({'kind': 'place', 'x_m': 12.0}, math.inf), ({'kind': 'none'}, math.inf)])
 def test_an_onset_needs_its_recording(said: dict[str, Any], error: float) -> None:
-    truth = answer('slope', onset={'kind': 'time', 'recording': 'rec2', 'time_s': 12.0})
-    one = judge(truth, outcome('known', finding('slope', 'translation', onset=said)))
-    assert one.onset_error == pytest.approx(error)
+    truth = answer('slope', onset={'type': 'time', 'recording': 'rec2',
+                                   'seconds_after_epoch': 12.0})
+    one = marked(truth, outcome(finding('slope', onset=said)))
+    assert one.marks[0].onset == pytest.approx(error)
     assert not one.onset_invented
 
 
 def test_an_onset_where_there_is_none_is_noted() -> None:
-    said = {'kind': 'place', 'x_m': 1.0}
-    one = judge(answer('slope'), outcome('known', finding('slope', 'translation', onset=said)))
+    one = marked(answer('slope'), outcome(finding('slope', onset={'kind': 'place', 'x_m': 1.0})))
     assert one.onset_invented
-    assert one.onset_error is None
+    assert one.marks[0].onset is None
     start = {'kind': 'time', 'recording': 'rec1', 'time_s': 0.04}
-    one = judge(answer('slope'), outcome('known', finding('slope', 'translation', onset=start)))
-    assert not one.onset_invented
+    assert not marked(answer('slope'), outcome(finding('slope', onset=start))).onset_invented
 
 
-def test_sides_count_where_one_side_is_hit() -> None:
+def test_sides_count_where_one_side_is_hit_and_its_effect_named() -> None:
     truth = answer('torque_ripple', side='left')
-    right = finding('torque_ripple', 'drivetrain', side='left')
-    assert judge(truth, outcome('known', right)).side is True
-    assert judge(truth, outcome('known', {**right, 'side': 'both'})).side is False
-    assert judge(truth, outcome('known', finding('slope', 'translation'))).side is None
+    right = finding('torque_ripple', side='left')
+    assert marked(truth, outcome(right)).marks[0].side is True
+    assert marked(truth, outcome({**right, 'side': 'both'})).marks[0].side is False
+    assert marked(truth, outcome(finding('slope'))).marks[0].side is None
 
 
-def test_pairs_count_both() -> None:
+def test_of_a_pair_the_strongest_two_findings_count_in_any_order() -> None:
     truth = answer('slope', 'gyro_bias', kind='pair')
-    both = [finding('gyro_bias', 'sensor'), finding('slope', 'translation')]
-    assert judge(truth, outcome('known', *both)).found == 2
-    assert judge(truth, outcome('known', both[0])).found == 1
+    both = [finding('gyro_bias', gain=9.0), finding('slope', gain=90.0)]
+    assert marked(truth, outcome(*both)).right == 1.0
+    assert marked(truth, outcome(both[0])).right == 0.0
+    third = finding('payload', gain=20.0)
+    one = marked(truth, outcome(*both, third))
+    assert (one.right, one.extra) == (0.0, 1)
 
 
 def test_share_of_the_achievable() -> None:
@@ -190,83 +203,73 @@ def test_errors_have_the_size_of_the_difference() -> None:
     assert found['position_m'] == pytest.approx(0.1 * 10.0 / math.sqrt(3.0), rel=0.01)
 
 
-def judgements() -> list[Any]:
+def test_calibration_is_counted_by_hand() -> None:
+    """Nine of ten at 0.95 right and one of two at 0.55: (10·0.05 + 2·0.05) / 12."""
+    said = [marked(answer('slope'), outcome(finding('slope'), confidence=0.95))] * 9
+    said += [marked(answer('slope'), outcome(finding('gyro_bias'), confidence=0.95))]
+    said += [marked(answer('slope'), outcome(finding(name), confidence=0.55))
+             for name in ('slope', 'gyro_bias')]
+    found = summary.reliability(said)
+    assert found['error'] == pytest.approx((10 * 0.05 + 2 * 0.05) / 12)
+    assert [row['count'] for row in found['bins']] == [2, 10]
+    assert found['bins'][1]['right'] == pytest.approx(0.9)
+    assert found['mean_when_wrong'] == pytest.approx(0.75)
+    sure = marked(answer('slope'), outcome(finding('slope'), confidence=1.0))
+    assert summary.reliability([sure])['bins'][0]['from'] == pytest.approx(0.9)
+    assert summary.reliability([])['error'] is None
+
+
+def judgements() -> list[Judgement]:
     held = {who: {'all': value, 'position_m': 3.0 * value}
             for who, value in (('plain', 2.0), ('augmented', 0.8), ('truth', 0.5))}
-    right = {**outcome('known', finding('slope', 'translation')), 'held_out': [held]}
-    wrong = outcome('known', finding('payload', 'translation'))
-    return [judge(answer('slope'), right), judge(answer('slope'), right),
-            judge(answer('slope'), wrong), judge(answer(kind='clean'), wrong),
-            judge(answer(kind='clean'), outcome('nothing_missing')),
-            judge(answer('slope', 'gyro_bias', kind='pair'), right)]
+    right = {**outcome(finding('slope')), 'held_out': [held]}
+    wrong = outcome(finding('payload'))
+    rough = {**answer('slope'), 'regime': {'floor': 'rough'}, 'unseen': ['wheels: lowpass'],
+             'world': 'Bullet'}
+    return [marked(answer('slope'), right), marked(answer('slope'), right),
+            marked(rough, wrong), marked(answer(), wrong), marked(answer(), outcome()),
+            marked(answer('slope', 'gyro_bias', kind='pair'), right)]
 
 
 def test_the_summary_counts() -> None:
     result = summary.summarise(judgements())
     rates = {rate['name']: rate for rate in result['rates']}
-    assert rates['medium and strong: named right']['value'] == pytest.approx(2.0 / 3.0)
-    assert rates['medium and strong: named right']['reached'] is False
-    assert rates['clean: named, called unknown or failed (false alarm)']['value'] == 0.5
-    assert rates['clean: named, called unknown or failed (false alarm)']['reached'] is False
+    assert rates['single effects: named right']['value'] == pytest.approx(2.0 / 3.0)
+    assert rates['single effects: named right']['reached'] is False
+    alarms = rates['clean robots: named, called unknown or failed (false alarm)']
+    assert (alarms['value'], alarms['reached']) == (0.5, False)
     assert rates['pairs: at least one right']['reached'] is True
     assert rates['pairs: both right']['reached'] is False
-    assert result['shares']['known effects, all'] == {
-        'count': 3, 'median': pytest.approx(0.8), 'lower_quartile': pytest.approx(0.8),
-        'upper_quartile': pytest.approx(0.8)}
+    assert result['shares']['known effects, all']['median'] == pytest.approx(0.8)
     table = result['confusion']
     row = table['counts'][table['hidden'].index('slope')]
     assert row[table['named'].index('slope')] == 2
     assert row[table['named'].index('payload')] == 1
     assert sum(map(sum, table['counts'])) == 5
     assert result['by_effect']['slope']['named'] == {'slope': 2, 'payload': 1}
+    families = {(row['axis'], row['family']): row for row in result['by_regime']}
+    assert families['floor', 'rough']['named']['hits'] == 0
+    assert families['floor', 'smooth']['named']['hits'] == 2
+    assert families['world', 'Bullet']['named']['count'] == 1
+    assert families['left out of tuning', 'wheels: lowpass']['named']['count'] == 1
 
 
-def test_a_wrong_name_beside_a_weak_effect_s_right_one_is_a_wrong_name() -> None:
-    weak = answer('slope', severity='weak')
-    right, two = (outcome('known', *found) for found in (
-        (finding('slope', 'translation'),),
-        (finding('slope', 'translation'), finding('gyro_bias', 'sensor'))))
-    rates = {rate.name: rate for rate in summary.rates([judge(weak, right), judge(weak, two)])}
-    assert rates['weak: named right'].value == 1.0
-    assert rates['weak: named right, nothing or unknown, and no wrong name'].value == 0.5
-
-
-def test_shares_against_a_baseline_stand_apart() -> None:
-    """They count what is known of the base, too: a clean robot has a share there."""
-    held = {who: {'all': value, 'position_m': value}
-            for who, value in (('plain', 2.0), ('augmented', 0.8), ('truth', 0.5))}
-    cases = []
-    for kind, effects in (('clean', ()), ('single', ('slope',))):
-        given = answer(*effects, kind=kind)
-        given['spec']['world'] = 'g3'
-        cases.append(judge(given, {**outcome('nothing_missing'), 'held_out': [held]}))
-    result = summary.summarise(cases)
-    assert result['shares']['known effects, all']['count'] == 0
-    assert result['shares']['against a baseline, all']['count'] == 1
-    assert result['shares']['against a baseline, clean, all']['median'] == pytest.approx(0.8)
-    assert result['by_effect']['slope']['median_share'] is None
-
-
-def test_text_and_page_say_the_figures() -> None:
-    result = {**summary.summarise(judgements()), 'command': 'lg_husky prove', 'planned': 6,
-              'seal': 'ab' * 32, 'first_seed': 10_000, 'last_seed': 10_005}
+def test_text_and_page_say_the_figures_of_each_set_apart() -> None:
+    result = summary.summarise(judgements())
     assert '6 cases: 3 single effects, 1 pairs, 2 clean, 0 outside' in text_of(result)
-    assert 'medium and strong: named right' in text_of(result)
-    page = page_of(result)
-    assert '| medium and strong: named right | 2 of 3 | 67 % (21 % to 94 %) | ≥ 80 % | missed |' \
-        in page
-    assert '| slope | 3 | 2 | 3 | 0.80 | payload 1 |' in page
-    assert 'cases to finish' not in page
-    assert 'The first 6 of 9 cases to finish' in page_of({**result, 'planned': 9})
-    one = {'command': 'lg_husky prove --seed 10000', 'planned': 4, 'cases': 4, 'seal': 'ab' * 32,
-           'first_seed': 10_000, 'last_seed': 10_003}
-    page = page_of({**result, 'trials': [one, {
-        **one, 'command': 'lg_husky prove --seed 11000', 'planned': 9, 'cases': 2,
-        'seal': 'cd' * 32, 'first_seed': 11_000, 'last_seed': 11_008}]})
-    assert '    lg_husky prove --seed 10000\n    lg_husky prove --seed 11000\n' in page
-    assert f'`{"ab" * 8}` and `{"cd" * 8}`' in page
-    assert 'reported here have 10000 to 10003 and 11000 to 11008.' in page
-    assert 'The first 4 of 4 and the first 2 of 9 cases to finish' in page
+    facts = {'command': 'lg_husky prove --report', 'commit': 'c0ffee', 'cases': 6, 'planned': 6,
+             'seal': 'ab' * 32, 'seeds': '10000 to 10005', 'set': 'report'}
+    page = page_of({'report': (result, [facts]), 'tuning': (result, [facts])},
+                   ['docs/some.jsonl'])
+    assert page.count('| single effects: named right | 2 of 3 | 67 % (21 % to 94 %) '
+                      '| ≥ 80 % | missed |') >= 2
+    assert 'lg_husky prove --from docs/some.jsonl --page docs/proof.md' in page
+    assert '| `lg_husky prove --report` | `c0ffee` | 10000 to 10005 | 6 of 6 |' in page
+    assert page.index('## Reported trial') < page.index('## Tuning trial')
+    assert '| slope | 3 | 2 | 3 | payload 1 |' in page
+    assert 'Expected calibration error' in page
+    assert 'No set is reported' not in page
+    assert 'No set is reported' in page_of({'tuning': (result, [facts])}, ['a'])
 
 
 def test_pictures_are_drawn(tmp_path: Any) -> None:
@@ -274,5 +277,5 @@ def test_pictures_are_drawn(tmp_path: Any) -> None:
     from lg_husky_sim.proof.pictures import draw
     paths = draw(summary.summarise(judgements()), tmp_path / 'pictures')
     assert [path.name for path in paths] == [
-        'proof_confusion.png', 'proof_rates.png', 'proof_shares.png']
+        'proof_confusion.png', 'proof_rates.png', 'proof_reliability.png']
     assert all(path.stat().st_size > 5000 for path in paths)
