@@ -28,16 +28,22 @@ if TYPE_CHECKING:
               help='End by itself after so long; by default Ctrl-C ends it.')
 @click.option('--every', default=1.0, show_default=True, metavar='SECONDS',
               type=click.FloatRange(min=0.05), help='Time between two lines and publications.')
+@click.option('--pose-topic', metavar='TOPIC',
+              help='Odometry that tells where the robot really is (filtered, ground truth): the '
+              'models are kept there.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
               type=click.FloatRange(min=0.0), help='How long to look for a Husky.')
 def command(model: Path, plain: Path | None, preset: str | None, namespace: str | None,
-            seconds: float | None, every: float, wait: float) -> None:
+            seconds: float | None, every: float, pose_topic: str | None, wait: float) -> None:
     """
     Listen to a robot's commands, joint states and IMU, and run two models beside it.
 
     The running errors (root mean square, the last 10 s) are printed and published as
-    std_msgs/Float64 on twin/plain/wheel_rate_error, twin/model/yaw_rate_error, …; the robot may as
-    well be `lg_husky play REC` or another simulator.
+    std_msgs/Float64 on twin/plain/wheel_rate_error, twin/model/yaw_rate_error, …; for plots
+    (layout config/twin.foxglove.json), twin/measured and twin/model/reading are published at each
+    stamp. The models begin at the robot's wheel angles and heading, apply delays, sensor faults
+    and onsets that were found, and follow the clock of its stamps. The robot may as well be
+    `lg_husky play REC` or another simulator.
     """
     from lg_husky_sim.husky.model import compile_model
     from lg_husky_sim.husky.model_file import load_model
@@ -48,7 +54,7 @@ def command(model: Path, plain: Path | None, preset: str | None, namespace: str 
     plants = {name: compile_model(one.structure).at(one.parameters)
               for name, one in files.items()}
     with ros_tool(NAME, preset, namespace, wait=wait) as (tool, settings):
-        twin = Twin(tool, plants, settings, _sides)
+        twin = Twin(tool, plants, settings, _sides, pose_topic)
         begun = time.monotonic()
         try:
             while seconds is None or time.monotonic() - begun < seconds:

@@ -77,3 +77,17 @@ def test_layouts_show_topics_that_exist() -> None:
     paths = [path['value'] for panel in panels.values() for path in panel.get('paths', ())]
     assert len(paths) == 8
     assert all(path.split('.')[0] in {f'/{topic}' for topic in relative} for path in paths)
+
+
+def test_the_layout_of_the_twin_shows_what_it_publishes() -> None:
+    """Row 22: measured, model and plain model beside each other, and the running errors."""
+    text = (ROOT / 'config' / 'twin.foxglove.json').read_text(encoding='utf-8')
+    source = (ROOT / 'lg_husky_sim' / 'ros' / 'twin.py').read_text(encoding='utf-8')
+    paths = {path['value'] for panel in json.loads(text)['configById'].values()
+             for path in panel['paths']}
+    assert {path.split('.')[0] for path in paths} == {
+        '/twin/measured', '/twin/model/reading', '/twin/plain/reading',
+        *(f'/twin/{name}/{quantity}_error' for name in ('model', 'plain')
+          for quantity in ('wheel_rate', 'yaw_rate'))}
+    for topic in ("'twin/measured'", "f'twin/{name}/reading'", "f'twin/{name}/{quantity}_error'"):
+        assert topic in source

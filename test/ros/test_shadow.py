@@ -1,0 +1,118 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The live twin's arithmetic, without a graph: the true model of any effect has the smaller error.
+
+The robot is a simulation that is sampled with the robot's own angles, heading and delays; it has
+driven for a while before anybody listens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.ros.shadow import PERIOD, Shadow
+from lg_husky_sim.ros.stamp_clock import StampClock
+from lg_husky_sim.signals import BodyTwist, Pose
+from lg_husky_sim.simulation import Simulator
+import pytest
+
+Maker = Callable[..., Plant]
+
+
+def commanded(moment: float) -> BodyTwist:
+    """Return a drive that goes on and on: ahead, a turn, back."""
+    phase = moment % 8.0
+    return BodyTwist(0.6, 0.0) if phase < 3.0 else BodyTwist(0.3, 0.6) if phase < 6.0 else (
+        BodyTwist(-0.5, 0.0))
+
+
+def errors(truth: Plant, models: dict[str, Plant], *, late: float = 0.0, factor: float = 1.0,
+           joined: float = 5.0, until: float = 25.0) -> dict[str, float]:
+    """
+    Drive a robot beside models, and return each one's overall error of the wheel rates [rad/s].
+
+    Joint states come every second step, with stamps that are late by some time [s] and a left
+    encoder with a factor; the models join after some seconds.
+    """
+    simulator = Simulator(truth, PERIOD)
+    state = simulator.initial(Pose(1.0, -2.0, 0.8), wheel_angles=(2.0, 0.5))
+    shadows = {name: Shadow(plant) for name, plant in models.items()}
+    told = BodyTwist()
+    steps = [(state.time, state)]
+    for step in range(round(until / PERIOD)):
+        moment = step * PERIOD
+        wanted = commanded(moment)
+        if wanted != told:
+            told = wanted
+            for shadow in shadows.values():
+                shadow.command(moment, told)
+        state = simulator.step(state, told)
+        steps.append((state.time, state))
+        if moment < joined or step % 2:
+            continue
+        past = steps[-1 - round(late / PERIOD)][1]
+        for shadow in shadows.values():
+            shadow.place(state.pose, correct=True)
+            shadow.wheels(state.time + 1e-7, factor * past.wheel_rates[0], past.wheel_rates[1], (
+                factor * past.wheel_angles[0], past.wheel_angles[1]))
+    return {name: shadow.errors['wheel_rate'].overall for name, shadow in shadows.items()}
+
+
+@pytest.mark.parametrize(('effect', 'values', 'sensed'), [
+    (Effect('torque_ripple', 'both'), {'ripple_cos': 6.0, 'ripple_sin': 4.0}, {}),
+    (Effect('slope'), {'slope_x': -60.0, 'slope_y': 30.0}, {}),
+    (Effect('sensor_time_offset', shape='wheels'), {'stamp_delay': 0.2}, {'late': 0.2}),
+    (Effect('encoder_scale', 'left'), {'encoder_factor': 0.9}, {'factor': 0.9}),
+    (Effect('coulomb_drivetrain', 'both'), {'dry_torque': 3.0}, {}),
+])
+def test_the_true_model_has_the_smaller_live_error(
+        robot: Maker, effect: Effect, values: dict[str, float], sensed: dict[str, float]) -> None:
+    """Rows 22 and 33: with the true model of a slope or a ripple the error doubled."""
+    model = robot(effect, **values)
+    # Delays and factors belong to the sensors, which this test reads by itself.
+    truth = robot() if sensed else model
+    found = errors(truth, {'model': model, 'plain': robot()}, **sensed)
+    assert found['model'] < 0.25 * found['plain']
+    assert found['plain'] > 0.01
+
+
+def test_an_effect_that_begins_at_a_place_begins_there_live(robot: Maker) -> None:
+    """Row 33: its onset was ignored; the model knew the effect always or never."""
+    onset = Onset(OnsetKind.PLACE_ABOVE, 0.85)
+    model = robot(Effect('slope', late=True), onset=onset, slope_x=-80.0, slope_y=0.0)
+    always = robot('slope', slope_x=-80.0, slope_y=0.0)
+    found = errors(model, {'model': model, 'always': always, 'plain': robot()})
+    assert found['model'] < 0.25 * min(found['always'], found['plain'])
+
+
+def test_a_late_message_is_compared_with_its_own_moment(robot: Maker) -> None:
+    """A command that overtakes a measurement on its way changes nothing about it."""
+    plant = robot()
+    shadow, truth = Shadow(plant), Simulator(plant, PERIOD)
+    state = truth.initial()
+    shadow.wheels(0.0, 0.0, 0.0, (0.0, 0.0))
+    shadow.command(0.0, BodyTwist(0.8, 0.0))
+    for _ in range(10):
+        state = truth.step(state, BodyTwist(0.8, 0.0))
+    shadow.command(0.3, BodyTwist(0.0, 0.0))
+    shadow.wheels(0.1, *state.wheel_rates)
+    assert shadow.errors['wheel_rate'].overall < 1e-6
+
+
+@pytest.mark.parametrize('pace', [0.2, 1.0, 5.0])
+def test_the_clock_of_the_stamps_is_followed_at_any_speed(pace: float) -> None:
+    """Row 33: simulated time and its pauses; what has no stamp is placed among what has one."""
+    clock = StampClock()
+    assert math.isnan(clock.now(0.0))
+    for step in range(200):
+        arrival = 100.0 + 0.02 * step + (0.008 if step % 3 else 0.0)
+        assert clock.observe(arrival, pace * 0.02 * step)
+    assert clock.now(103.99) == pytest.approx(pace * 3.99, abs=0.2 * pace * 0.02 + 1e-9)
+    # Paused: nothing is put further ahead than the next message.
+    assert clock.now(160.0) == pytest.approx(pace * 4.0, abs=0.05 * pace)
+    assert not clock.observe(161.0, 0.0)
+    assert clock.now(161.0) == 0.0
