@@ -1,0 +1,187 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A commercial base: limited commands, a wheel-speed loop, four tyres that saturate."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from lg_husky_sim.jit import jit
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Parameters of the robot, in the order in which the integrator reads them; units and meanings
+#: stand in ``config/before_after.yaml``.
+ROBOT: Final = (
+    'slew_forward', 'slew_yaw', 'limit_forward', 'limit_yaw', 'speed_gain', 'turn_width',
+    'loop_feedforward', 'loop_gain', 'loop_integral', 'voltage_limit', 'current_limit',
+    'wheel_inertia', 'dry_left', 'dry_right', 'viscous_left', 'viscous_right',
+    'grip_along', 'grip_across', 'creep_speed', 'creep_share', 'rolling', 'yaw_damping',
+    'mass', 'yaw_inertia', 'com_x', 'com_y', 'com_height', 'radius_left', 'radius_right',
+    'slope_x', 'slope_y', 'track')
+#: Numbers that are not estimated, read behind them.
+FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
+                'load_time', 'dry_speed', 'rolling_speed', 'gravity')
+#: Columns of what is simulated: base_link's velocity, wheels, specific force at the centre.
+OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'accel_y')
+
+_LEAST_SHARE: Final = 0.02  # of the load that an axle or a side keeps: it does not lift off
+
+
+@jit
+def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
+             wheels: FloatArray, given: bool, start: FloatArray, out: FloatArray) -> None:
+    """
+    Integrate the robot; stiff terms are implicit with the slope of the moment's secant.
+
+    Parameters
+    ----------
+    p : numpy.ndarray, shape (n_robot + n_fixed,)
+        As `ROBOT`, then `FIXED`.
+    step : float
+        [s].
+    command : numpy.ndarray, shape (n, 2)
+        Mean command in each step, delayed [m/s, rad/s].
+    level : numpy.ndarray, shape (n, 2)
+        Cosine and sine of the heading; zeros where it is not known.
+    wheels : numpy.ndarray, shape (n + 1, 2)
+        Measured wheel rates [rad/s]; followed where `given`.
+    given : bool
+    start : numpy.ndarray, shape (5,)
+        Forward and lateral speed, yaw rate, wheel rates.
+    out : numpy.ndarray, shape (n + 1, 7)
+        Filled with `OUTPUTS`.
+    """
+    slew_v, slew_w, limit_v, limit_w, speed_gain, turn_width = p[0], p[1], p[2], p[3], p[4], p[5]
+    kff, kp, ki, v_max, i_max, inertia = p[6], p[7], p[8], p[9], p[10], p[11]
+    mux, muy, creep, share, rolling, yaw_damping = p[16], p[17], p[18], p[19], p[20], p[21]
+    mass, turning, xc, yc, height = p[22], p[23], p[24], p[25], p[26]
+    slope_x, slope_y, track = p[29], p[30], p[31]
+    wheelbase, resistance, emf, radius = p[32], p[33], p[34], p[35]
+    load_time, dry_speed, rolling_speed, gravity = p[36], p[37], p[38], p[39]
+    half, side = 0.5 * wheelbase, 0.5 * track
+    radii = (p[27], p[28])
+    dry = (p[12], p[13])
+    viscous = (p[14], p[15])
+    volt_per_amp = emf / resistance
+    v, u, r = start[0] - start[2] * yc, start[1] + start[2] * xc, start[2]
+    w = np.array([start[3], start[4]])
+    held = np.zeros(2)
+    for s in range(2):
+        e = dry[s] * w[s] / np.sqrt(w[s] * w[s] + dry_speed * dry_speed) + viscous[s] * w[s]
+        held[s] = e / volt_per_amp + (emf - kff) * w[s]
+    ref_v = 0.5 * radius * (w[0] + w[1]) / speed_gain
+    ref_w = radius * (w[1] - w[0]) / turn_width
+    acc_x, acc_y = 0.0, 0.0
+    keep = step / (step + load_time)
+    a = np.zeros(2)
+    cy = np.zeros(2)
+    cr = np.zeros(2)
+    d = np.zeros(2)
+    nw = np.zeros(2)
+    m = mass / step
+    jz = turning / step
+    out[0, 0] = v + r * yc
+    out[0, 1] = u - r * xc
+    out[0, 2] = r
+    out[0, 3] = w[0]
+    out[0, 4] = w[1]
+    out[0, 5] = 0.0
+    out[0, 6] = 0.0
+    for k in range(command.shape[0]):
+        want_v = min(max(command[k, 0], -limit_v), limit_v)
+        want_w = min(max(command[k, 1], -limit_w), limit_w)
+        ref_v += min(max(want_v - ref_v, -slew_v * step), slew_v * step)
+        ref_w += min(max(want_w - ref_w, -slew_w * step), slew_w * step)
+        gx = -(slope_x * level[k, 0] + slope_y * level[k, 1])
+        gy = -(-slope_x * level[k, 1] + slope_y * level[k, 0])
+        front = 0.5 * (1.0 + (xc - height * acc_x / gravity) / half)
+        left = 0.5 * (1.0 + (yc - height * acc_y / gravity) / side)
+        front = min(max(front, _LEAST_SHARE), 1.0 - _LEAST_SHARE)
+        left = min(max(left, _LEAST_SHARE), 1.0 - _LEAST_SHARE)
+        # Chassis: [m v, m u, jz r] with the tyres' secant slopes c.
+        a00 = m + rolling * mass * gravity / np.sqrt(v * v + rolling_speed * rolling_speed)
+        a01, a02, a11, a12 = 0.0, 0.0, m, 0.0
+        a22 = jz + yaw_damping
+        b0 = m * v + mass * r * u + mass * gx
+        b1 = m * u - mass * r * v + mass * gy
+        b2 = jz * r
+        for s in range(2):
+            y = (side if s == 0 else -side) - yc
+            a[s] = 0.0
+            cy[s] = 0.0
+            cr[s] = 0.0
+            across = left if s == 0 else 1.0 - left
+            for f in range(2):
+                x = (half if f == 0 else -half) - xc
+                load = mass * gravity * across * (front if f == 0 else 1.0 - front)
+                sx = (v - r * y - radii[s] * w[s]) / mux
+                sy = (u + r * x) / muy
+                edge = creep + share * abs(radii[s] * w[s])
+                c = load / np.sqrt(sx * sx + sy * sy + edge * edge)
+                a[s] += c
+                a11 += c
+                a12 += c * x
+                a22 += c * x * x
+            a00 += a[s]
+            a02 -= a[s] * y
+            a22 += a[s] * y * y
+            if given:
+                # The forces with the wheel's rate known.
+                push = a[s] * radii[s] * wheels[k + 1, s]
+                b0 += push
+                b2 -= push * y
+                continue
+            wanted = (speed_gain * ref_v + (-0.5 if s == 0 else 0.5) * turn_width * ref_w) / radius
+            error = wanted - w[s]
+            volts = kff * wanted + kp * error + held[s]
+            loss = viscous[s] + dry[s] / np.sqrt(w[s] * w[s] + dry_speed * dry_speed)
+            d[s] = inertia / step + loss + radii[s] * radii[s] * a[s]
+            nw[s] = inertia / step * w[s]
+            clipped = min(max(volts, -v_max), v_max)
+            amps = (clipped - emf * w[s]) / resistance
+            if abs(amps) > i_max:
+                nw[s] += emf * (i_max if amps > 0.0 else -i_max)
+            else:
+                d[s] += volt_per_amp * emf
+                if clipped == volts:
+                    d[s] += volt_per_amp * kp
+                    nw[s] += volt_per_amp * (kff * wanted + kp * wanted + held[s])
+                else:
+                    nw[s] += volt_per_amp * clipped
+            if clipped == volts and abs(amps) <= i_max:
+                held[s] += ki * error * step
+            # Wheel eliminated: w' = (nw + R a (v' - r' y)) / d.
+            g = radii[s] * a[s]
+            b0 += g * nw[s] / d[s]
+            b2 -= y * g * nw[s] / d[s]
+            lost = g * g / d[s]
+            a00 -= lost
+            a02 += lost * y
+            a22 -= lost * y * y
+        # Symmetric 3x3.
+        k00 = a11 * a22 - a12 * a12
+        k01 = a02 * a12 - a01 * a22
+        k02 = a01 * a12 - a02 * a11
+        det = a00 * k00 + a01 * k01 + a02 * k02
+        nv = (k00 * b0 + k01 * b1 + k02 * b2) / det
+        nu = (k01 * b0 + (a00 * a22 - a02 * a02) * b1 + (a01 * a02 - a00 * a12) * b2) / det
+        nr = (k02 * b0 + (a01 * a02 - a00 * a12) * b1 + (a00 * a11 - a01 * a01) * b2) / det
+        fx = (nv - v) / step - r * u - gx
+        fy = (nu - u) / step + r * v - gy
+        acc_x += keep * (fx - acc_x)
+        acc_y += keep * (fy - acc_y)
+        out[k + 1, 5] = fx
+        out[k + 1, 6] = fy
+        v, u, r = nv, nu, nr
+        for s in range(2):
+            if given:
+                w[s] = wheels[k + 1, s]
+            else:
+                y = (side if s == 0 else -side) - yc
+                w[s] = (nw[s] + radii[s] * a[s] * (v - r * y)) / d[s]
+        out[k + 1, 0] = v + r * yc
+        out[k + 1, 1] = u - r * xc
+        out[k + 1, 2] = r
+        out[k + 1, 3] = w[0]
+        out[k + 1, 4] = w[1]

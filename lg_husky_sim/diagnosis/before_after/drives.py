@@ -1,0 +1,168 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings as what is compared with the base: samples averaged in bins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from lg_husky_sim.recording import Recording, segments
+from lg_husky_sim.signals import FloatArray, TimeSeries
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Bins:
+    """
+    The samples of one stream in bins of time.
+
+    Parameters
+    ----------
+    times : numpy.ndarray, shape (n_samples,)
+        Stamps of those that lie in a bin that is kept [s].
+    edges : numpy.ndarray, shape (n_bins,)
+        Index of each bin's first sample.
+    values : numpy.ndarray, shape (n_bins, n_channels)
+        Means of what was measured.
+    """
+
+    times: FloatArray
+    edges: NDArray[np.intp]
+    values: FloatArray
+
+    def mean(self, samples: FloatArray) -> FloatArray:
+        """Return the means over the bins of values at `times` along the first axis."""
+        counts = np.diff(np.append(self.edges, self.times.size))
+        sums = np.add.reduceat(samples, self.edges, axis=0)
+        return np.asarray(sums / counts.reshape((-1,) + (1,) * (samples.ndim - 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """
+    A stretch of a recording, ready to be predicted.
+
+    Parameters
+    ----------
+    recording : str
+    start : float
+        Of the simulation [s].
+    steps : int
+        Of the simulation.
+    command_times, command_sum : numpy.ndarray, shapes (n,) and (n, 2)
+        Integral of the command from its first stamp to each stamp.
+    command_last : numpy.ndarray, shape (2,)
+        The command that holds from the last stamp on.
+    level : numpy.ndarray, shape (steps, 2)
+        Cosine and sine of the measured heading; zeros without a pose.
+    wheels : TimeSeries
+        Measured rates.
+    begin : numpy.ndarray, shape (5,)
+        Speeds at the start: forward, lateral, yaw, wheels.
+    bins : mapping of str to Bins
+        By stream: wheels, imu, pose.
+    """
+
+    recording: str
+    start: float
+    steps: int
+    command_times: FloatArray
+    command_sum: FloatArray
+    command_last: FloatArray
+    level: FloatArray
+    wheels: TimeSeries
+    begin: FloatArray
+    bins: Mapping[str, Bins]
+
+
+def _binned(times: FloatArray, values: FloatArray, start: float, width: float) -> Bins:
+    width = max(width, float(np.median(np.diff(times)))) if times.size > 1 else width
+    index = np.floor((times - start) / width).astype(np.intp)
+    _, first, counts = np.unique(index, return_index=True, return_counts=True)
+    enough = counts >= 0.5 * np.median(counts)
+    keep = np.repeat(enough, counts)
+    edges = np.concatenate([[0], np.cumsum(counts[enough])[:-1]]).astype(np.intp)
+    bins = Bins(times[keep], edges, np.zeros((0, 0)))
+    return Bins(bins.times, bins.edges, bins.mean(values[keep]))
+
+
+def drives(recording: Recording, step: float, widths: Mapping[str, float], settle: float,
+           shortest: float) -> tuple[Drive, ...]:
+    """
+    Cut a recording at its gaps and bin its samples.
+
+    Parameters
+    ----------
+    recording : Recording
+    step : float
+        Of the simulation [s].
+    widths : mapping of str to float
+        Width of a bin of each kind of channel [s].
+    settle : float
+        Left out at the start of each stretch, whose state is not known [s].
+    shortest : float
+        Shortest stretch that is used [s].
+
+    Returns
+    -------
+    tuple of Drive
+    """
+    recording.stream('command')
+    recording.stream('wheels')
+    found = []
+    for part in segments(recording):
+        if part.duration < shortest:
+            continue
+        found.append(_drive(part.recording, part.start, part.end, part.streams, step, widths,
+                            settle))
+    return tuple(found)
+
+
+def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries], step: float,
+           widths: Mapping[str, float], settle: float) -> Drive:
+    steps = int(np.floor((end - start) / step))
+    middle = start + step * (np.arange(steps) + 0.5)
+    command, wheels = streams['command'], streams['wheels']
+    gaps = np.diff(command.times)[:, None]
+    total = np.vstack([np.zeros((1, 2)), np.cumsum(command.values[:-1] * gaps, axis=0)])
+    level = np.zeros((steps, 2))
+    bins: dict[str, Bins] = {}
+
+    def binned(stream: str, values: FloatArray, kind: str) -> None:
+        later = streams[stream].times >= start + settle
+        bins[stream] = _binned(streams[stream].times[later], values[later], start, widths[kind])
+
+    binned('wheels', wheels.values, 'wheels')
+    begin = np.zeros(5)
+    begin[3:] = np.median(wheels.values[:5], axis=0)
+    if 'imu' in streams:
+        binned('imu', streams['imu'].values, 'yaw')
+        begin[2] = float(np.median(streams['imu'].values[:5, 0]))
+    if 'pose' in streams:
+        pose = streams['pose']
+        heading = np.unwrap(pose.values[:, 2])
+        binned('pose', np.column_stack([pose.values[:, :2], heading]), 'place')
+        at = np.interp(middle, pose.times, heading)
+        level = np.column_stack([np.cos(at), np.sin(at)])
+    return Drive(name, start, steps, command.times, total, command.values[-1], level, wheels,
+                 begin, bins)
+
+
+def mean_command(drive: Drive, step: float, delay: float) -> FloatArray:
+    """Return the mean delayed command in each step, shape (steps, 2)."""
+    at = drive.start - delay + step * np.arange(drive.steps + 1)
+    index = np.clip(np.searchsorted(drive.command_times, at, side='right') - 1, 0, None)
+    beyond = np.maximum(at - drive.command_times[-1], 0.0)
+    total = np.column_stack([
+        np.interp(at, drive.command_times, drive.command_sum[:, k]) for k in range(2)])
+    total += beyond[:, None] * drive.command_last
+    del index
+    return np.asarray(np.diff(total, axis=0) / step)
+
+
+def all_drives(recordings: Sequence[Recording], step: float, widths: Mapping[str, float],
+               settle: float, shortest: float) -> tuple[Drive, ...]:
+    """Return the drives of several recordings, in order."""
+    return tuple(d for r in recordings for d in drives(r, step, widths, settle, shortest))

@@ -1,0 +1,219 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the base predicts for a drive, in bins, and how that depends on its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from lg_husky_sim.diagnosis.before_after.base_robot import FIXED, ROBOT, simulate
+from lg_husky_sim.diagnosis.before_after.drives import Bins, Drive, mean_command
+from lg_husky_sim.diagnosis.before_after.settings import Quantity, Settings
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Channels by stream; those of the pose are movements from one bin to the next, in the frame of
+#: the middle between them.
+CHANNELS = {'wheels': ('left', 'right'), 'imu': ('yaw', 'accel_x', 'accel_y'),
+            'pose': ('ahead', 'aside', 'turn')}
+#: Their kinds in ``config/before_after.yaml``.
+KINDS = {'left': 'wheels', 'right': 'wheels', 'yaw': 'yaw', 'accel_x': 'accel',
+         'accel_y': 'accel', 'ahead': 'place', 'aside': 'place', 'turn': 'heading'}
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """
+    The base robot of one nominal model.
+
+    Parameters
+    ----------
+    settings : Settings
+    start : numpy.ndarray, shape (n,)
+        Means of the priors, on the scale of the estimates.
+    fixed : numpy.ndarray
+        Numbers that are not estimated.
+    given : bool
+        Whether the wheels turn as measured, which leaves the body's motion to be explained.
+    """
+
+    settings: Settings
+    start: FloatArray
+    fixed: FloatArray
+    given: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the parameters."""
+        return tuple(q.name for q in self.settings.quantities)
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return parameters [their units] from the scale of the estimates."""
+        logs = np.array([q.logarithmic for q in self.settings.quantities])
+        return np.where(logs, np.exp(np.where(logs, z, 0.0)), z)
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return the bounds on the scale of the estimates."""
+        def scaled(q: Quantity, value: float) -> float:
+            return float(np.log(value)) if q.logarithmic else value
+        quantities = self.settings.quantities
+        return (np.array([scaled(q, q.lower) for q in quantities]),
+                np.array([scaled(q, q.upper) for q in quantities]))
+
+
+def base_of(settings: Settings, nominal: Parameters, given: bool = False) -> Base:
+    """Return the base for the parameters of the model in doubt."""
+    start = [nominal[q.nominal] if q.start is None else q.start for q in settings.quantities]
+    logs = [q.logarithmic for q in settings.quantities]
+    z = np.array([np.log(x) if log else x for x, log in zip(start, logs, strict=True)])
+    numbers = {**settings.simulation,
+               'wheelbase': nominal['wheelbase'], 'wheel_radius': nominal['wheel_radius'],
+               'motor_resistance': nominal['motor_resistance'],
+               'transmission': nominal['torque_constant'] * nominal['gear_ratio']}
+    return Base(settings, z, np.array([numbers[name] for name in FIXED]), given)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What the integrator gives: velocities, and the path of base_link."""
+
+    out: FloatArray
+    path: FloatArray
+
+
+def moved(base: Base, drive: Drive, x: FloatArray) -> Motion:
+    """Simulate a drive; `x` in units."""
+    step = base.settings.simulation['step']
+    names = base.names
+    robot = np.concatenate([x[:len(ROBOT)], base.fixed])
+    out = np.empty((drive.steps + 1, 7))
+    grid = drive.start + step * np.arange(drive.steps + 1)
+    late = x[names.index('wheels_late')]
+    begin = np.array(drive.begin)
+    mean_rim = (x[names.index('radius_left')] * begin[3]
+                + x[names.index('radius_right')] * begin[4]) / 2.0
+    begin[0] = mean_rim
+    if base.given:
+        wheels = np.column_stack([
+            np.interp(grid + late, drive.wheels.times, drive.wheels.values[:, k])
+            for k in range(2)])
+        command = np.zeros((drive.steps, 2))
+    else:
+        wheels = np.zeros((drive.steps + 1, 2))
+        command = mean_command(drive, step, x[names.index('dead_time')])
+    simulate(robot, step, command, drive.level, wheels, base.given, begin, out)
+    turn = 0.5 * step * (out[1:, 2] + out[:-1, 2])
+    heading = np.concatenate([[0.0], np.cumsum(turn)])
+    middle = heading[:-1] + 0.5 * turn
+    speed = 0.5 * step * (out[1:, :2] + out[:-1, :2])
+    cos, sin = np.cos(middle), np.sin(middle)
+    path = np.zeros((drive.steps + 1, 3))
+    path[1:, 0] = np.cumsum(cos * speed[:, 0] - sin * speed[:, 1])
+    path[1:, 1] = np.cumsum(sin * speed[:, 0] + cos * speed[:, 1])
+    path[:, 2] = heading
+    return Motion(out, path)
+
+
+def _at(times: FloatArray, start: float, step: float, rows: FloatArray) -> FloatArray:
+    # Linear interpolation on the simulation's even grid.
+    place = np.clip((times - start) / step, 0.0, rows.shape[0] - 1.000001)
+    index = place.astype(np.intp)
+    share = (place - index)[:, None]
+    return np.asarray(rows[index] * (1.0 - share) + rows[index + 1] * share)
+
+
+def movements(bins: Bins, path: FloatArray) -> FloatArray:
+    """Return the movement between bins in the frame of their mean heading, shape (n - 1, 3)."""
+    del bins
+    step = np.diff(path, axis=0)
+    heading = 0.5 * (path[1:, 2] + path[:-1, 2])
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.column_stack([cos * step[:, 0] + sin * step[:, 1],
+                            cos * step[:, 1] - sin * step[:, 0], step[:, 2]])
+
+
+def predicted(base: Base, drive: Drive, x: FloatArray, motion: Motion) -> dict[str, FloatArray]:
+    """Return what each stream's bins should read, by stream."""
+    step = base.settings.simulation['step']
+    value = dict(zip(base.names, x, strict=True))
+    found = {}
+    if not base.given:
+        bins = drive.bins['wheels']
+        found['wheels'] = bins.mean(_at(bins.times - value['wheels_late'], drive.start, step,
+                                        motion.out[:, 3:5]))
+    if 'imu' in drive.bins:
+        bins = drive.bins['imu']
+        rows = bins.mean(_at(bins.times - value['imu_late'], drive.start, step,
+                             motion.out[:, [2, 5, 6]]))
+        rate = rows[:, 0]
+        turning = np.gradient(rate, base.settings.bins['yaw'])
+        found['imu'] = np.column_stack([
+            value['gyro_factor'] * rate + value['gyro_bias'],
+            rows[:, 1] - value['imu_x'] * rate ** 2 + value['accel_bias_x'],
+            rows[:, 2] + value['imu_x'] * turning + value['accel_bias_y']])
+    if 'pose' in drive.bins:
+        bins = drive.bins['pose']
+        path = bins.mean(_at(bins.times - value['pose_late'], drive.start, step, motion.path))
+        found['pose'] = movements(bins, path)
+    return found
+
+
+def measured(base: Base, drive: Drive) -> dict[str, FloatArray]:
+    """Return what each stream's bins read."""
+    found = {name: bins.values for name, bins in drive.bins.items()
+             if name != 'pose' and not (base.given and name == 'wheels')}
+    if 'pose' in drive.bins:
+        found['pose'] = movements(drive.bins['pose'], drive.bins['pose'].values)
+    return found
+
+
+def residual(base: Base, drive: Drive, z: FloatArray) -> dict[str, FloatArray]:
+    """Return measured less predicted, by stream; `z` on the scale of the estimates."""
+    x = base.values(z)
+    there = measured(base, drive)
+    should = predicted(base, drive, x, moved(base, drive, x))
+    return {name: there[name] - should[name] for name in should}
+
+
+def jacobian(base: Base, drive: Drive, z: FloatArray, free: FloatArray
+             ) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray]]:
+    """
+    Return the residual and its difference quotients, by stream.
+
+    Parameters
+    ----------
+    base : Base
+    drive : Drive
+    z : numpy.ndarray, shape (n,)
+        On the scale of the estimates.
+    free : numpy.ndarray of bool, shape (n,)
+        Which columns to work out; the others are zero.
+
+    Returns
+    -------
+    mapping of str to numpy.ndarray
+        Residual, shape (n_bins, n_channels).
+    mapping of str to numpy.ndarray
+        Its derivatives, shape (n_bins, n_channels, n).
+    """
+    x = base.values(z)
+    motion = moved(base, drive, x)
+    there, should = measured(base, drive), predicted(base, drive, x, motion)
+    columns = {name: np.zeros((*rows.shape, z.size)) for name, rows in should.items()}
+    upper = base.bounds()[1]
+    again = {'dead_time', 'wheels_late'} if base.given is False else {'wheels_late'}
+    for k, quantity in enumerate(base.settings.quantities):
+        if not free[k]:
+            continue
+        delta = quantity.delta if z[k] + quantity.delta <= upper[k] else -quantity.delta
+        near = np.array(z)
+        near[k] += delta
+        changed = base.values(near)
+        same = k >= len(ROBOT) and quantity.name not in again
+        other = predicted(base, drive, changed,
+                          motion if same else moved(base, drive, changed))
+        for name, rows in other.items():
+            columns[name][:, :, k] = (should[name] - rows) / delta
+    return {name: there[name] - should[name] for name in should}, columns

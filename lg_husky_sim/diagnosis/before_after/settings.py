@@ -1,0 +1,129 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers of ``config/before_after.yaml``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT
+from lg_husky_sim.errors import DiagnosisError
+from lg_husky_sim.resources import config_path
+from lg_husky_sim.yaml_files import read_yaml, shown
+
+SCHEMA = 'lg_husky_sim/before_after/1'
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """
+    A parameter of the base robot or of what records it.
+
+    Parameters
+    ----------
+    name, unit, meaning : str
+    logarithmic : bool
+        Whether it is estimated as its natural logarithm.
+    start : float or None
+        Mean of the prior; None where the model in doubt gives it under the name ``nominal``.
+    nominal : str
+    sd, recording, change, delta : float
+        On the scale of the estimate: of the prior, between recordings, of a change; step of a
+        difference quotient.
+    lower, upper : float
+        Bounds [unit].
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    logarithmic: bool
+    start: float | None
+    nominal: str
+    sd: float
+    recording: float
+    change: float
+    delta: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Settings:
+    """
+    Everything in the file.
+
+    Parameters
+    ----------
+    robot, record : tuple of Quantity
+        Of the robot, in the order of ``ROBOT``; of the command path and the sensors.
+    simulation : mapping of str to float
+    bins, noise : mapping of str to float
+        Of each kind of channel: width of a bin [s], residual to begin with [unit].
+    """
+
+    robot: tuple[Quantity, ...]
+    record: tuple[Quantity, ...]
+    simulation: Mapping[str, float]
+    bins: Mapping[str, float]
+    noise: Mapping[str, float]
+    content: Mapping[str, Any]
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """All that is estimated, in order."""
+        return (*self.robot, *self.record)
+
+
+def _number(where: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise DiagnosisError(f'before_after.yaml: {where} = {shown(value)} is not a number')
+    return float(value)
+
+
+def _quantity(name: str, entry: Mapping[str, Any]) -> Quantity:
+    scale = entry['scale']
+    if scale not in ('log', 'linear'):
+        raise DiagnosisError(f'before_after.yaml: {name}: scale = {shown(scale)} is neither log '
+                             'nor linear')
+    numbers = {key: _number(f'{name}.{key}', entry[key])
+               for key in ('sd', 'recording', 'change', 'delta', 'lower', 'upper')}
+    start = _number(f'{name}.start', entry['start']) if 'start' in entry else None
+    return Quantity(name, str(entry['unit']), str(entry['meaning']), scale == 'log', start,
+                    str(entry.get('nominal', '')), **numbers)
+
+
+@cache
+def settings() -> Settings:
+    """
+    Read ``config/before_after.yaml``.
+
+    Returns
+    -------
+    Settings
+
+    Raises
+    ------
+    DiagnosisError
+        If an entry is missing, unknown or no number.
+    """
+    path = config_path('before_after.yaml')
+    content = read_yaml(path, DiagnosisError)
+    try:
+        robot = {name: _quantity(name, entry) for name, entry in content['robot'].items()}
+        if set(robot) != set(ROBOT):
+            odd = sorted(set(robot) ^ set(ROBOT))
+            raise DiagnosisError(f'{path}: robot lacks or should not have {", ".join(odd)}')
+        record = tuple(_quantity(name, entry) for name, entry in content['record'].items())
+        simulation = {name: _number(name, entry['value'])
+                      for name, entry in content['simulation'].items()}
+        channels = content['channels'].items()
+        bins = {name: _number(f'{name}.bin', entry['bin']) for name, entry in channels}
+        noise = {name: _number(f'{name}.noise', entry['noise']) for name, entry in channels}
+    except (KeyError, TypeError, AttributeError) as error:
+        raise DiagnosisError(f'{path} cannot be understood: {error!r}') from error
+    return Settings(tuple(robot[name] for name in ROBOT), record, simulation, bins, noise,
+                    content)
