@@ -18,10 +18,10 @@ ROBOT: Final = (
     'wheel_inertia', 'dry_left', 'dry_right', 'viscous_left', 'viscous_right',
     'grip_along', 'grip_across', 'creep_speed', 'creep_share', 'rolling', 'yaw_damping',
     'mass', 'yaw_inertia', 'com_x', 'com_y', 'com_height', 'radius_left', 'radius_right',
-    'slope_x', 'slope_y', 'track')
+    'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak')
 #: Numbers that are not estimated, read behind them.
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
-                'load_time', 'dry_speed', 'rolling_speed', 'gravity')
+                'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate')
 #: Columns of what is simulated: base_link's velocity, wheels, specific force at the centre.
 OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'accel_y')
 
@@ -57,8 +57,10 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     mux, muy, creep, share, rolling, yaw_damping = p[16], p[17], p[18], p[19], p[20], p[21]
     mass, turning, xc, yc, height = p[22], p[23], p[24], p[25], p[26]
     slope_x, slope_y, track = p[29], p[30], p[31]
-    wheelbase, resistance, emf, radius = p[32], p[33], p[34], p[35]
-    load_time, dry_speed, rolling_speed, gravity = p[36], p[37], p[38], p[39]
+    build = step / p[32]
+    wheelbase, resistance, emf, radius = p[34], p[35], p[36], p[37]
+    load_time, dry_speed, rolling_speed, gravity, rest_rate = p[38], p[39], p[40], p[41], p[42]
+    kept = np.exp(-p[33] * step)
     half, side = 0.5 * wheelbase, 0.5 * track
     radii = (p[27], p[28])
     dry = (p[12], p[13])
@@ -75,9 +77,10 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     acc_x, acc_y = 0.0, 0.0
     keep = step / (step + load_time)
     a = np.zeros(2)
-    cy = np.zeros(2)
-    cr = np.zeros(2)
+    fixed = np.zeros(2)
     d = np.zeros(2)
+    bristle = np.zeros((4, 2))
+    soft = np.zeros(4)
     nw = np.zeros(2)
     m = mass / step
     jz = turning / step
@@ -109,8 +112,7 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
         for s in range(2):
             y = (side if s == 0 else -side) - yc
             a[s] = 0.0
-            cy[s] = 0.0
-            cr[s] = 0.0
+            fixed[s] = 0.0
             across = left if s == 0 else 1.0 - left
             for f in range(2):
                 x = (half if f == 0 else -half) - xc
@@ -118,7 +120,15 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
                 sx = (v - r * y - radii[s] * w[s]) / mux
                 sy = (u + r * x) / muy
                 edge = creep + share * abs(radii[s] * w[s])
-                c = load / np.sqrt(sx * sx + sy * sy + edge * edge)
+                i = 2 * s + f
+                soft[i] = 1.0 + build * (np.sqrt(sx * sx + sy * sy) + edge)
+                c = load * build / soft[i]
+                ox = load * bristle[i, 0] / soft[i]
+                oy = load * bristle[i, 1] / soft[i]
+                fixed[s] += ox
+                b0 -= ox
+                b1 -= oy
+                b2 += ox * y - oy * x
                 a[s] += c
                 a11 += c
                 a12 += c * x
@@ -137,7 +147,7 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
             volts = kff * wanted + kp * error + held[s]
             loss = viscous[s] + dry[s] / np.sqrt(w[s] * w[s] + dry_speed * dry_speed)
             d[s] = inertia / step + loss + radii[s] * radii[s] * a[s]
-            nw[s] = inertia / step * w[s]
+            nw[s] = inertia / step * w[s] + radii[s] * fixed[s]
             clipped = min(max(volts, -v_max), v_max)
             amps = (clipped - emf * w[s]) / resistance
             if abs(amps) > i_max:
@@ -151,6 +161,8 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
                     nw[s] += volt_per_amp * clipped
             if clipped == volts and abs(amps) <= i_max:
                 held[s] += ki * error * step
+            if abs(wanted) < rest_rate:
+                held[s] *= kept
             # Wheel eliminated: w' = (nw + R a (v' - r' y)) / d.
             g = radii[s] * a[s]
             b0 += g * nw[s] / d[s]
@@ -175,11 +187,16 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
         out[k + 1, 6] = fy
         v, u, r = nv, nu, nr
         for s in range(2):
+            y = (side if s == 0 else -side) - yc
             if given:
                 w[s] = wheels[k + 1, s]
             else:
-                y = (side if s == 0 else -side) - yc
                 w[s] = (nw[s] + radii[s] * a[s] * (v - r * y)) / d[s]
+            for f in range(2):
+                i = 2 * s + f
+                x = (half if f == 0 else -half) - xc
+                bristle[i, 0] = (bristle[i, 0] + build * (v - r * y - radii[s] * w[s])) / soft[i]
+                bristle[i, 1] = (bristle[i, 1] + build * (u + r * x)) / soft[i]
         out[k + 1, 0] = v + r * yc
         out[k + 1, 1] = u - r * xc
         out[k + 1, 2] = r

@@ -69,20 +69,29 @@ class SetFit:
     cost: float
 
 
+def whites(base: Base, drives: Sequence[Drive], noise: Noise, z: FloatArray,
+           pool: ThreadPoolExecutor) -> list[FloatArray]:
+    """Return the whitened residuals of each drive."""
+    return list(pool.map(lambda drive: noise.white(residual(base, drive, z)), drives))
+
+
+def _cost(errors: Sequence[FloatArray], prior: Prior, z: FloatArray) -> float:
+    total = 0.5 * sum(float(e @ e) for e in errors) + prior.cost(z)
+    return total if np.isfinite(total) else float(np.inf)
+
+
 def cost_at(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, z: FloatArray,
             pool: ThreadPoolExecutor) -> float:
     """Return the negative log posterior [nats]; infinity where the simulation breaks down."""
-    def one(drive: Drive) -> float:
-        e = noise.white(residual(base, drive, z))
-        return 0.5 * float(e @ e)
-    total = sum(pool.map(one, drives)) + prior.cost(z)
-    return float(total) if np.isfinite(total) else float(np.inf)
+    return _cost(whites(base, drives, noise, z, pool), prior, z)
 
 
 def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, begin: FloatArray,
             steps: int, enough: float, pool: ThreadPoolExecutor) -> SetFit:
     """
     Fit by Gauss-Newton with Levenberg's damping.
+
+    Derivatives serve for further steps as long as these gain about what they promise.
 
     Parameters
     ----------
@@ -92,7 +101,7 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
     noise : Noise
     begin : numpy.ndarray, shape (n,)
     steps : int
-        At most.
+        With derivatives of their own, at most.
     enough : float
         A step that gains less ends the fit [nats].
     pool : ThreadPoolExecutor
@@ -103,35 +112,38 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
     """
     lower, upper = base.bounds()
     z = np.clip(begin, lower, upper)
-    cost = cost_at(base, drives, prior, noise, z, pool)
+    free = prior.free
+    precision = 1.0 / prior.sd[free] ** 2
     damping = 1e-3
-    count = int(np.sum(prior.free))
+    cost = float(np.inf)
     for _ in range(steps):
-        gram, slope = np.zeros((count, count)), np.zeros(count)
-
         def one(drive: Drive, at: FloatArray = z) -> tuple[FloatArray, FloatArray]:
-            rows, columns = jacobian(base, drive, at, prior.free)
-            e, j = noise.white(rows), noise.white(columns)[:, prior.free]
-            return j.T @ j, j.T @ e
-        for part, direction in pool.map(one, drives):
-            gram += part
-            slope += direction
-        precision = 1.0 / prior.sd[prior.free] ** 2
-        slope += precision * (z - prior.mean)[prior.free]
-        gram[np.diag_indices(count)] += precision
-        gained = -1.0
-        for _attempt in range(6):
-            damped = gram + damping * np.diag(np.diag(gram))
-            move = np.linalg.solve(damped, slope)
+            rows, columns = jacobian(base, drive, at, free)
+            return noise.white(rows), noise.white(columns)[:, free]
+        pairs = list(pool.map(one, drives))
+        errors, derivatives = [e for e, _ in pairs], [j for _, j in pairs]
+        cost = _cost(errors, prior, z)
+        gram = np.diag(precision) + sum(j.T @ j for j in derivatives)
+        begun = cost
+        for _attempt in range(8):
+            slope = precision * (z - prior.mean)[free] + sum(
+                j.T @ e for j, e in zip(derivatives, errors, strict=True))
+            move = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), slope)
             near = np.array(z)
-            near[prior.free] -= move
+            near[free] -= move
             near = np.clip(near, lower, upper)
-            other = cost_at(base, drives, prior, noise, near, pool)
-            if other < cost:
-                gained, z, cost = cost - other, near, other
-                damping = max(damping / 5.0, 1e-6)
+            promised = 0.5 * float(slope @ move)
+            other = whites(base, drives, noise, near, pool)
+            reached = _cost(other, prior, near)
+            if reached >= cost:
+                damping *= 8.0
+                if begun > cost:
+                    break
+                continue
+            gained, z, cost, errors = cost - reached, near, reached, other
+            damping = max(damping / 5.0, 1e-6)
+            if gained < max(0.5 * promised, enough):
                 break
-            damping *= 8.0
-        if gained < enough:
+        if begun - cost < enough:
             break
     return SetFit(z, cost)

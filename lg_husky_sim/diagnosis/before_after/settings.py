@@ -52,6 +52,35 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Change:
+    """
+    A hypothesis: some parameters differ between the sets.
+
+    Parameters
+    ----------
+    effect, side, subsystem : str
+        As in a finding.
+    block : str
+        body or loop: where it shows.
+    parameters : tuple of str
+        Names of those that differ.
+    title, regime : str
+        In words.
+    elements : tuple of str
+        Of the linear graph.
+    """
+
+    effect: str
+    side: str
+    subsystem: str
+    block: str
+    parameters: tuple[str, ...]
+    title: str
+    regime: str
+    elements: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Settings:
     """
     Everything in the file.
@@ -70,7 +99,12 @@ class Settings:
     simulation: Mapping[str, float]
     bins: Mapping[str, float]
     noise: Mapping[str, float]
-    content: Mapping[str, Any]
+    body: frozenset[str]
+    limits: frozenset[str]
+    starts: tuple[Mapping[str, float], ...]
+    fit: Mapping[str, float]
+    decision: Mapping[str, float]
+    changes: tuple[Change, ...]
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -96,6 +130,24 @@ def _quantity(name: str, entry: Mapping[str, Any]) -> Quantity:
                     str(entry.get('nominal', '')), **numbers)
 
 
+def _change(entry: Mapping[str, Any], known: frozenset[str]) -> Change:
+    for name in entry['parameters']:
+        if name not in known:
+            raise DiagnosisError(f'before_after.yaml: change {entry["effect"]}: unknown parameter '
+                                 f'{shown(name)}')
+    if entry['block'] not in ('body', 'loop'):
+        raise DiagnosisError(f'before_after.yaml: change {entry["effect"]}: block = '
+                             f'{shown(entry["block"])} is neither body nor loop')
+    return Change(entry['effect'], entry['side'], entry['subsystem'], entry['block'],
+                  tuple(entry['parameters']), entry['title'], entry['regime'],
+                  tuple(entry['elements']))
+
+
+def _values(content: Mapping[str, Any], section: str) -> dict[str, float]:
+    return {name: _number(f'{section}.{name}', entry['value'])
+            for name, entry in content[section].items()}
+
+
 @cache
 def settings() -> Settings:
     """
@@ -118,12 +170,20 @@ def settings() -> Settings:
             odd = sorted(set(robot) ^ set(ROBOT))
             raise DiagnosisError(f'{path}: robot lacks or should not have {", ".join(odd)}')
         record = tuple(_quantity(name, entry) for name, entry in content['record'].items())
-        simulation = {name: _number(name, entry['value'])
-                      for name, entry in content['simulation'].items()}
         channels = content['channels'].items()
         bins = {name: _number(f'{name}.bin', entry['bin']) for name, entry in channels}
         noise = {name: _number(f'{name}.noise', entry['noise']) for name, entry in channels}
+        known = frozenset((*robot, *(q.name for q in record)))
+        groups = {key: frozenset(content[key]) for key in ('body', 'limits')}
+        starts = tuple({name: _number(f'starts.{name}', value) for name, value in entry.items()}
+                       for entry in content['starts'])
+        for name in sorted({*groups['body'], *groups['limits'], *(n for s in starts for n in s)}
+                           - known):
+            raise DiagnosisError(f'{path}: unknown parameter {shown(name)}')
+        return Settings(tuple(robot[name] for name in ROBOT), record,
+                        _values(content, 'simulation'), bins, noise, groups['body'],
+                        groups['limits'], starts, _values(content, 'fit'),
+                        _values(content, 'decision'),
+                        tuple(_change(entry, known) for entry in content['changes']))
     except (KeyError, TypeError, AttributeError) as error:
         raise DiagnosisError(f'{path} cannot be understood: {error!r}') from error
-    return Settings(tuple(robot[name] for name in ROBOT), record, simulation, bins, noise,
-                    content)
