@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from lg_husky_sim.recording import Recording, segments
+from lg_husky_sim.recording.recording import CHANNELS
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,10 @@ class Bins:
         sums = np.add.reduceat(samples, self.edges, axis=0)
         return np.asarray(sums / counts.reshape((-1,) + (1,) * (samples.ndim - 1)))
 
+    def centres(self) -> FloatArray:
+        """Return the mean stamps of the bins [s]."""
+        return self.mean(self.times)
+
 
 @dataclass(frozen=True, eq=False)
 class Drive:
@@ -58,7 +63,7 @@ class Drive:
     level : numpy.ndarray, shape (steps, 2)
         Cosine and sine of the measured heading; zeros without a pose.
     wheels : TimeSeries
-        Measured rates.
+        Measured rates; empty without them.
     begin : numpy.ndarray, shape (5,)
         Speeds at the start: forward, lateral, yaw, wheels.
     bins : mapping of str to Bins
@@ -110,7 +115,8 @@ def drives(recording: Recording, step: float, widths: Mapping[str, float], settl
     tuple of Drive
     """
     recording.stream('command')
-    recording.stream('wheels')
+    if not {'wheels', 'imu', 'pose'} & set(recording.streams):
+        recording.stream('wheels')  # says what it has
     found = []
     for part in segments(recording):
         if part.duration < shortest:
@@ -124,7 +130,7 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
            widths: Mapping[str, float], settle: float) -> Drive:
     steps = int(np.floor((end - start) / step))
     middle = start + step * (np.arange(steps) + 0.5)
-    command, wheels = streams['command'], streams['wheels']
+    command = streams['command']
     gaps = np.diff(command.times)[:, None]
     total = np.vstack([np.zeros((1, 2)), np.cumsum(command.values[:-1] * gaps, axis=0)])
     level = np.zeros((steps, 2))
@@ -134,9 +140,12 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
         later = streams[stream].times >= start + settle
         bins[stream] = _binned(streams[stream].times[later], values[later], start, widths[kind])
 
-    binned('wheels', wheels.values, 'wheels')
     begin = np.zeros(5)
-    begin[3:] = np.median(wheels.values[:5], axis=0)
+    wheels = TimeSeries(np.zeros(0), np.zeros((0, 2)), CHANNELS['wheels'])
+    if 'wheels' in streams:
+        wheels = streams['wheels']
+        binned('wheels', wheels.values, 'wheels')
+        begin[3:] = np.median(wheels.values[:5], axis=0)
     if 'imu' in streams:
         binned('imu', streams['imu'].values, 'yaw')
         begin[2] = float(np.median(streams['imu'].values[:5, 0]))
@@ -153,12 +162,10 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
 def mean_command(drive: Drive, step: float, delay: float) -> FloatArray:
     """Return the mean delayed command in each step, shape (steps, 2)."""
     at = drive.start - delay + step * np.arange(drive.steps + 1)
-    index = np.clip(np.searchsorted(drive.command_times, at, side='right') - 1, 0, None)
     beyond = np.maximum(at - drive.command_times[-1], 0.0)
     total = np.column_stack([
         np.interp(at, drive.command_times, drive.command_sum[:, k]) for k in range(2)])
     total += beyond[:, None] * drive.command_last
-    del index
     return np.asarray(np.diff(total, axis=0) / step)
 
 

@@ -139,7 +139,7 @@ def predicted(base: Base, drive: Drive, x: FloatArray, motion: Motion) -> dict[s
     step = base.settings.simulation['step']
     value = dict(zip(base.names, x, strict=True))
     found = {}
-    if not base.given:
+    if not base.given and 'wheels' in drive.bins:
         bins = drive.bins['wheels']
         found['wheels'] = bins.mean(_at(bins.times - value['wheels_late'], drive.start, step,
                                         motion.out[:, 3:5]))

@@ -81,6 +81,15 @@ class Change:
 
 
 @dataclass(frozen=True)
+class Separation:
+    """What tells names apart: sensors and drives, in words."""
+
+    effects: frozenset[str]
+    sensors: tuple[str, ...]
+    drives: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Settings:
     """
     Everything in the file.
@@ -105,6 +114,8 @@ class Settings:
     fit: Mapping[str, float]
     decision: Mapping[str, float]
     changes: tuple[Change, ...]
+    aliases: Mapping[str, tuple[str, ...]]
+    separations: tuple[Separation, ...]
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -184,6 +195,9 @@ def settings() -> Settings:
                         _values(content, 'simulation'), bins, noise, groups['body'],
                         groups['limits'], starts, _values(content, 'fit'),
                         _values(content, 'decision'),
-                        tuple(_change(entry, known) for entry in content['changes']))
+                        tuple(_change(entry, known) for entry in content['changes']),
+                        {name: tuple(others) for name, others in content['aliases'].items()},
+                        tuple(Separation(frozenset(e['effects']), tuple(e['sensors']),
+                                         tuple(e['drives'])) for e in content['separations']))
     except (KeyError, TypeError, AttributeError) as error:
         raise DiagnosisError(f'{path} cannot be understood: {error!r}') from error

@@ -1,0 +1,122 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which change is named, how surely, and what it cannot be told from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
+from lg_husky_sim.diagnosis.before_after.settings import Settings
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """
+    The answer.
+
+    Parameters
+    ----------
+    named : Candidate or None
+        None where nothing changed.
+    rivals : tuple of Candidate
+        The best of every other name, by gain.
+    tied : tuple of str
+        Names that cannot be told from the one given, itself first; empty where it stands alone.
+    confidence : float
+    """
+
+    named: Candidate | None
+    rivals: tuple[Candidate, ...]
+    tied: tuple[str, ...]
+    confidence: float
+
+
+def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], numbers: Mapping[str, float]
+             ) -> Candidate | None:
+    """
+    Return the change that is claimed, if any.
+
+    The motion of the body at the measured wheel rates decides first: a change of the loop leaves
+    it alone. Only a change of the loop that gains many times as much overrules it.
+
+    Parameters
+    ----------
+    body, loop : sequence of Candidate
+        By gain, the largest first.
+    numbers : mapping of str to float
+        ``decision`` of the settings.
+
+    Returns
+    -------
+    Candidate or None
+    """
+    first = _simplest(body, numbers)
+    other = _simplest(loop, numbers)
+    if first is not None and first.gain > numbers['body_claim'] and (
+            other is None or other.gain < numbers['loop_share'] * first.gain):
+        return first
+    options = [one for one in (first, other) if one is not None and one.gain > numbers['claim']]
+    return max(options, key=lambda one: one.gain, default=None)
+
+
+def _simplest(candidates: Sequence[Candidate], numbers: Mapping[str, float]) -> Candidate | None:
+    # Of names that gain as much, the smaller hypothesis.
+    if not candidates:
+        return None
+    best = candidates[0]
+    equal = [one for one in candidates if best.gain - one.gain < numbers['tie']
+             and one.gain > numbers['claim']
+             and set(one.change.parameters) < set(best.change.parameters)]
+    return min(equal, key=lambda one: len(one.change.parameters), default=best)
+
+
+def decide(body: Block | None, loop: Block | None, settings: Settings) -> Decision:
+    """
+    Decide from what both blocks say.
+
+    Parameters
+    ----------
+    body, loop : Block or None
+        None where the recordings lack what it takes.
+    settings : Settings
+
+    Returns
+    -------
+    Decision
+    """
+    numbers = settings.decision
+    bodily = () if body is None else body.candidates
+    looped = () if loop is None else loop.candidates
+    named = named_by(bodily, looped, numbers)
+    everything = sorted((*bodily, *looped), key=lambda one: -one.gain)
+    if named is None:
+        largest = max((one.gain for one in everything), default=0.0)
+        doubt = numbers['sure_doubt'] * float(np.clip(largest / numbers['claim'], 0.0, 2.0))
+        return Decision(None, _best_of_names(everything, ''), (),
+                        _bounded(numbers['sure_nothing'] - doubt, numbers))
+    same = [one for one in everything if one.change.block == named.change.block]
+    rivals = _best_of_names(same, named.change.effect)
+    second = max(rivals[0].gain, 0.0) if rivals else 0.0
+    margin = float(np.clip(1.0 - second / named.gain, 0.0, 1.0))
+    odds = (numbers['sure_offset'] + numbers['sure_margin'] * margin
+            + numbers['sure_gain'] * float(np.log(named.gain / numbers['claim'])))
+    alike = [one.change.effect for one in rivals if one.gain > numbers['claim'] and (
+        named.gain - one.gain < max(numbers['tie'], numbers['near'] * named.gain))]
+    alike += settings.aliases.get(named.change.effect, ())
+    tied = (named.change.effect, *dict.fromkeys(alike)) if alike else ()
+    return Decision(named, rivals, tied, _bounded(odds, numbers))
+
+
+def _best_of_names(candidates: Sequence[Candidate], but: str) -> tuple[Candidate, ...]:
+    found: dict[str, Candidate] = {}
+    for one in candidates:
+        if one.change.effect != but:
+            found.setdefault(one.change.effect, one)
+    return tuple(found.values())
+
+
+def _bounded(odds: float, numbers: Mapping[str, float]) -> float:
+    return float(np.clip(1.0 / (1.0 + np.exp(-odds)), numbers['least'], numbers['most']))
