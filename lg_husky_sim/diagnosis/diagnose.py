@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from lg_husky_sim.diagnosis import judge
 from lg_husky_sim.diagnosis.confidence import estimates
@@ -35,6 +36,9 @@ from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
 import numpy as np
+
+if TYPE_CHECKING:
+    from lg_husky_sim.diagnosis.before_after.diagnose_change import ChangeCase
 
 #: Part of what a smooth effort gains that a guise must add to stay in the model beside it.
 MATERIAL = 0.01
@@ -106,7 +110,8 @@ def with_intervals(case: Search, nominal: Parameters) -> tuple[Parameter, ...]:
 
 
 def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Progress,
-             baseline: Sequence[Recording] = (), workers: Workers = HERE) -> Case:
+             baseline: Sequence[Recording] = (), workers: Workers = HERE
+             ) -> Case | ChangeCase:
     """
     Locate, name, model and show what a model lacks.
 
@@ -124,7 +129,8 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
 
     Returns
     -------
-    Case
+    Case or ChangeCase
+        The latter where a baseline is given.
 
     Raises
     ------
@@ -134,31 +140,29 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         If wheels turn faster than any do.
     """
     recordings, baseline = named_apart(recordings, baseline)
-    parts = usable_segments([*baseline, *recordings])
+    if baseline:
+        from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case
+        return change_case(recordings, baseline, nominal, progress, jobs=workers.jobs)
+    parts = usable_segments(recordings)
     whole = observations(parts)
-    for recording in (*baseline, *recordings):
+    for recording in recordings:
         if recording.name not in whole.recordings:
             observations(segments(recording))  # says what it lacks
     check_wheel_rates(whole, nominal)
     names = [r.name for r in recordings]
-    if baseline:
-        from lg_husky_sim.diagnosis.change import search_change
-        found = search_change(whole, {r.name for r in baseline}, nominal, progress, workers)
-    else:
-        progress('recalibration', 0.0)
-        whole, begin = as_read(whole, nominal.structure, nominal.parameters)
-        found = search(whole, nominal.structure, nominal.parameters, progress, start=begin,
-                       workers=workers)
-        other = read_otherwise(found)
-        if other is not None:
-            whole = other
-            found = search(whole, nominal.structure, nominal.parameters, progress,
-                           workers=workers)
+    progress('recalibration', 0.0)
+    whole, begin = as_read(whole, nominal.structure, nominal.parameters)
+    found = search(whole, nominal.structure, nominal.parameters, progress, start=begin,
+                   workers=workers)
+    other = read_otherwise(found)
+    if other is not None:
+        whole = other
+        found = search(whole, nominal.structure, nominal.parameters, progress, workers=workers)
     found = replace(found, final=ordered(found.final, whole.recordings))
     progress('numbers', 0.9)
     own = tuple(s for s in parts if s.recording in names)
     said, fit = _diagnosis(found, own, nominal, whole)
-    said = replace(said, notes=(*said.notes, *_mended((*baseline, *recordings))))
+    said = replace(said, notes=(*said.notes, *_mended(recordings)))
     return Case(said, found, own, nominal, fit)
 
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from lg_husky_sim.diagnosis.before_after.diagnose_change import ChangeCase
+from lg_husky_sim.diagnosis.before_after.report import change_report
 from lg_husky_sim.diagnosis.diagnose import Case
 from lg_husky_sim.diagnosis.report_of_case import case_report
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Verdict
@@ -77,7 +79,7 @@ def summary_text(diagnosis: Diagnosis) -> str:
     return '\n'.join(lines)
 
 
-def write_files(folder: Path, case: Case, with_report: bool = True,
+def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,
                 provenance: Provenance | None = None) -> str:
     """
     Write the files of a diagnosis, results first.
@@ -86,7 +88,7 @@ def write_files(folder: Path, case: Case, with_report: bool = True,
     ----------
     folder : pathlib.Path
         An empty folder.
-    case : Case
+    case : Case or ChangeCase
     with_report : bool
         Whether to write report.html and the pictures too.
     provenance : Provenance, optional
@@ -105,7 +107,8 @@ def write_files(folder: Path, case: Case, with_report: bool = True,
         + '\n', encoding='utf-8')
     if with_report:
         try:
-            write_report(case_report(case, provenance), folder)
+            write_report(change_report(case, provenance) if isinstance(case, ChangeCase)
+                         else case_report(case, provenance), folder)
         except Exception as error:  # the answer is worth more than its report
             return f'report.html could not be made: {type(error).__name__}: {error}'
     return ''

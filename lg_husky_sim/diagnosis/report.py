@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 import math
 
+from lg_husky_sim.diagnosis.before_after.settings import settings as before_after
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
 from lg_husky_sim.husky.effects import effect_kind, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
@@ -200,6 +201,10 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
         stream = _STREAMS.get(shapes.get((finding.effect, finding.side), ''))
         if stream:
             values['stream'] = stream
+        other = before_after().advice.get(finding.effect)
+        if other is not None:
+            robot += other
+            continue
         remedy = effect_kind(finding.effect).advice
         robot += filled(remedy.robot, values)
         simulator += filled(remedy.simulator, values)

@@ -29,6 +29,8 @@ class Candidate:
     Parameters
     ----------
     change : Change
+    parameters : tuple of str
+        Those that differ.
     gain : float
         Log evidence over that of no change [nats].
     before, shift : numpy.ndarray, shape (k,)
@@ -38,6 +40,7 @@ class Candidate:
     """
 
     change: Change
+    parameters: tuple[str, ...]
     gain: float
     before: FloatArray
     shift: FloatArray
@@ -56,7 +59,9 @@ class Block:
         The free fits, on the scale of the estimates.
     noise : Noise
     candidates : tuple of Candidate
-        By gain, the largest first.
+        Those that this block shows, by gain, the largest first.
+    others : tuple of Candidate
+        In the loop: the changes of the body, with all that differs.
     """
 
     base: Base
@@ -64,6 +69,7 @@ class Block:
     after: FloatArray
     noise: Noise
     candidates: tuple[Candidate, ...]
+    others: tuple[Candidate, ...]
 
 
 def compare(base: Base, before: Sequence[Drive], after: Sequence[Drive], begin: FloatArray,
@@ -107,7 +113,7 @@ def compare(base: Base, before: Sequence[Drive], after: Sequence[Drive], begin: 
     quadratics = [*_quadratics(base, before, noise, earlier, later, prior, pool, False),
                   *_quadratics(base, after, noise, later, earlier, prior, pool, True)]
     share(1.0)
-    return Block(base, earlier, later, noise, _candidates(base, prior, quadratics))
+    return Block(base, earlier, later, noise, *_candidates(base, prior, quadratics))
 
 
 def _started(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, begin: FloatArray,
@@ -165,7 +171,7 @@ def _joined(parts: Sequence[Quadratic]) -> list[Quadratic]:
 
 
 def _candidates(base: Base, prior: Prior, quadratics: Sequence[Quadratic]
-                ) -> tuple[Candidate, ...]:
+                ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
     quantities = base.settings.quantities
     index = np.flatnonzero(prior.free)
     place = {quantities[k].name: i for i, k in enumerate(index)}
@@ -176,13 +182,17 @@ def _candidates(base: Base, prior: Prior, quadratics: Sequence[Quadratic]
                         np.array([quantities[k].recording for k in index]),
                         np.array([quantities[k].change for k in index]))
     nothing = evidence.solve(np.zeros(0, dtype=np.intp)).evidence
-    block = 'body' if base.given else 'loop'
-    found = []
+    own, others = [], []
     for change in base.settings.changes:
-        if change.block != block or not all(name in place for name in change.parameters):
+        if base.given and change.block != 'body':
             continue
-        changed = np.array([place[name] for name in change.parameters], dtype=np.intp)
+        names = change.parameters if base.given else (*change.parameters, *change.more)
+        changed = np.array([place[name] for name in names], dtype=np.intp)
         solved = evidence.solve(changed)
-        found.append(Candidate(change, solved.evidence - nothing, solved.shared[changed],
-                               solved.shift, np.sqrt(np.diag(solved.covariance))))
-    return tuple(sorted(found, key=lambda one: -one.gain))
+        one = Candidate(change, names, solved.evidence - nothing, solved.shared[changed],
+                        solved.shift, np.sqrt(np.diag(solved.covariance)))
+        (own if base.given or change.block == 'loop' else others).append(one)
+
+    def ordered(found: Sequence[Candidate]) -> tuple[Candidate, ...]:
+        return tuple(sorted(found, key=lambda one: -one.gain))
+    return ordered(own), ordered(others)

@@ -32,7 +32,7 @@ def estimates(one: Candidate, settings: Settings) -> tuple[Estimate, ...]:
     wide = settings.decision['confidence_z'] * one.sd
     known = {q.name: q for q in settings.quantities}
     found = []
-    for k, name in enumerate(one.change.parameters):
+    for k, name in enumerate(one.parameters):
         quantity = known[name]
         at = one.before[k] + one.shift[k]
         value, low, high = (_value(quantity, at + side * wide[k]) for side in (0.0, -1.0, 1.0))

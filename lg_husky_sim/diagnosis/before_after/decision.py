@@ -34,8 +34,8 @@ class Decision:
     confidence: float
 
 
-def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], numbers: Mapping[str, float]
-             ) -> Candidate | None:
+def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], whole: Sequence[Candidate],
+             numbers: Mapping[str, float]) -> Candidate | None:
     """
     Return the change that is claimed, if any.
 
@@ -46,6 +46,9 @@ def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], numbers: Mapp
     ----------
     body, loop : sequence of Candidate
         By gain, the largest first.
+    whole : sequence of Candidate
+        The changes of the body as all channels see them, which settles what the body's motion
+        leaves open.
     numbers : mapping of str to float
         ``decision`` of the settings.
 
@@ -53,7 +56,7 @@ def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], numbers: Mapp
     -------
     Candidate or None
     """
-    first = _simplest(body, numbers)
+    first = _settled(body, whole, numbers)
     other = _simplest(loop, numbers)
     if first is not None and first.gain > numbers['body_claim'] and (
             other is None or other.gain < numbers['loop_share'] * first.gain):
@@ -62,12 +65,25 @@ def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], numbers: Mapp
     return max(options, key=lambda one: one.gain, default=None)
 
 
+def _settled(body: Sequence[Candidate], whole: Sequence[Candidate], numbers: Mapping[str, float]
+             ) -> Candidate | None:
+    # Names that gain as much in the body's motion, by what they gain in all channels.
+    near = [one for one in body if body[0].gain - one.gain < numbers['tie']
+            and one.gain > numbers['claim']]
+    if len(near) < 2:
+        return _simplest(body, numbers)
+    changes = [one.change for one in near]
+    better = _simplest([one for one in whole if one.change in changes], numbers)
+    return next((one for one in near if better is not None and one.change == better.change),
+                near[0])
+
+
 def _simplest(candidates: Sequence[Candidate], numbers: Mapping[str, float]) -> Candidate | None:
-    # Of names that gain as much, the smaller hypothesis.
+    # Of a hypothesis and a part of it that gains as much, the part.
     if not candidates:
         return None
     best = candidates[0]
-    equal = [one for one in candidates if best.gain - one.gain < numbers['tie']
+    equal = [one for one in candidates if best.gain - one.gain < numbers['smaller']
              and one.gain > numbers['claim']
              and set(one.change.parameters) < set(best.change.parameters)]
     return min(equal, key=lambda one: len(one.change.parameters), default=best)
@@ -90,7 +106,7 @@ def decide(body: Block | None, loop: Block | None, settings: Settings) -> Decisi
     numbers = settings.decision
     bodily = () if body is None else body.candidates
     looped = () if loop is None else loop.candidates
-    named = named_by(bodily, looped, numbers)
+    named = named_by(bodily, looped, () if loop is None else loop.others, numbers)
     everything = sorted((*bodily, *looped), key=lambda one: -one.gain)
     if named is None:
         largest = max((one.gain for one in everything), default=0.0)

@@ -164,7 +164,7 @@ def _p_value(decision: Decision, known: Settings) -> float:
     if decision.named is None:
         return math.nan
     count = len(known.changes)
-    freedom = len(decision.named.change.parameters)
+    freedom = len(decision.named.parameters)
     return float(min(1.0, count * chi2.sf(2.0 * decision.named.gain, freedom)))
 
 

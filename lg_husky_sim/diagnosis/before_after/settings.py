@@ -64,6 +64,8 @@ class Change:
         body or loop: where it shows.
     parameters : tuple of str
         Names of those that differ.
+    more : tuple of str
+        Of those that differ as well, and show in the loop only.
     title, regime : str
         In words.
     elements : tuple of str
@@ -75,6 +77,7 @@ class Change:
     subsystem: str
     block: str
     parameters: tuple[str, ...]
+    more: tuple[str, ...]
     title: str
     regime: str
     elements: tuple[str, ...]
@@ -116,6 +119,7 @@ class Settings:
     changes: tuple[Change, ...]
     aliases: Mapping[str, tuple[str, ...]]
     separations: tuple[Separation, ...]
+    advice: Mapping[str, tuple[str, ...]]
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -142,7 +146,7 @@ def _quantity(name: str, entry: Mapping[str, Any]) -> Quantity:
 
 
 def _change(entry: Mapping[str, Any], known: frozenset[str]) -> Change:
-    for name in entry['parameters']:
+    for name in (*entry['parameters'], *entry.get('more', ())):
         if name not in known:
             raise DiagnosisError(f'before_after.yaml: change {entry["effect"]}: unknown parameter '
                                  f'{shown(name)}')
@@ -150,7 +154,7 @@ def _change(entry: Mapping[str, Any], known: frozenset[str]) -> Change:
         raise DiagnosisError(f'before_after.yaml: change {entry["effect"]}: block = '
                              f'{shown(entry["block"])} is neither body nor loop')
     return Change(entry['effect'], entry['side'], entry['subsystem'], entry['block'],
-                  tuple(entry['parameters']), entry['title'], entry['regime'],
+                  tuple(entry['parameters']), tuple(entry.get('more', ())), entry['title'], entry['regime'],
                   tuple(entry['elements']))
 
 
@@ -198,6 +202,7 @@ def settings() -> Settings:
                         tuple(_change(entry, known) for entry in content['changes']),
                         {name: tuple(others) for name, others in content['aliases'].items()},
                         tuple(Separation(frozenset(e['effects']), tuple(e['sensors']),
-                                         tuple(e['drives'])) for e in content['separations']))
+                                         tuple(e['drives'])) for e in content['separations']),
+                        {name: tuple(lines) for name, lines in content['advice'].items()})
     except (KeyError, TypeError, AttributeError) as error:
         raise DiagnosisError(f'{path} cannot be understood: {error!r}') from error
