@@ -20,6 +20,7 @@ from lg_husky_sim.folders import result_folder
 
 if TYPE_CHECKING:
     from lg_husky_sim.api.comparing import Comparison
+    from lg_husky_sim.diagnosis.before_after.diagnose_change import ChangeCase
     from lg_husky_sim.diagnosis.diagnose import Case
     from lg_husky_sim.diagnosis.result import Diagnosis, Finding
 
@@ -31,7 +32,7 @@ class DiagnosisResult:
 
     Parameters
     ----------
-    case : Case
+    case : Case or ChangeCase
         The diagnosis with what it was made from.
     recordings : tuple of Recording
     before : Husky
@@ -40,7 +41,7 @@ class DiagnosisResult:
         Recordings before a change.
     """
 
-    case: Case
+    case: Case | ChangeCase
     recordings: tuple[Recording, ...]
     before: Husky
     baseline: tuple[Recording, ...] = ()

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import overload, TYPE_CHECKING
 
 from lg_husky_sim.diagnosis import judge
 from lg_husky_sim.diagnosis.confidence import estimates
@@ -107,6 +107,18 @@ def with_intervals(case: Search, nominal: Parameters) -> tuple[Parameter, ...]:
             f'recalibrated by lg_husky diagnose; nominal {nominal[number.name]:g}')
         found.append(replace(entry, low=number.low, high=number.high, source=source))
     return tuple(found)
+
+
+@overload
+def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Progress) -> Case:
+    ...
+
+
+@overload
+def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Progress,
+             baseline: Sequence[Recording] = (), workers: Workers = HERE
+             ) -> Case | ChangeCase:
+    ...
 
 
 def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Progress,

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 import math
 
-from lg_husky_sim.diagnosis.alike import with_common_errors
 from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.diagnose import _notes
 from lg_husky_sim.diagnosis.doubts import belief, is_guise, reading_gain
@@ -198,25 +197,6 @@ def test_a_name_for_hardly_anything_is_none_where_the_model_is_far(
     search = searched(data, plain, final, adopted=True)
     search = replace(search, rounds=tuple(replace(search.rounds[0], share=s) for s in shares))
     assert is_guise(search, Unnamed((), 100.0, 1, search.rounds[0].metric)) is guise
-
-
-def test_an_error_that_was_there_before_is_no_change(data: Observations, plain: Fit) -> None:
-    """It is larger in the later recordings: these went where the earlier ones never were."""
-    roomy = with_common_errors(data, plain)
-    assert roomy.common is not None
-    later = np.zeros(data.measured.size)
-    for one in data.slices:
-        later[one.first:one.last] = 3.0 if data.pieces[one.piece].recording == 'after' else 0.5
-    mask = data.channel_mask('yaw_rate')
-    columns = roomy.common[:, [k for k in range(roomy.common.shape[1])
-                               if np.any(roomy.common[mask, k])]]
-    error = later * columns[:, 1] * mask
-    worse = replace(plain, solution=replace(plain.solution,
-                                            predicted=plain.solution.predicted + error))
-    search = searched(roomy, plain, worse, change=True)
-    with_it, without = (ratios(search, worse, alike)['yaw_rate'] for alike in (False, True))
-    assert with_it > 4.0
-    assert without < 0.3 * with_it
 
 
 @pytest.mark.parametrize(('ratio', 'limit'), [(2.0, 2.78), (1.6, 2.07)])

@@ -6,29 +6,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
 
-from lg_husky_sim.diagnosis import closed_base
 from lg_husky_sim.diagnosis.candidates import effect_entries
-from lg_husky_sim.diagnosis.closed_base import starts, TYRES, with_adhesion
 from lg_husky_sim.diagnosis.fits import Fit, recalibrate
 from lg_husky_sim.diagnosis.judge import rivals_of
 from lg_husky_sim.diagnosis.rivals import rank, Rival
 from lg_husky_sim.diagnosis.rounds import is_eased, Round
 from lg_husky_sim.diagnosis.search import search
-from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.identification.noise import Metric
 from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.recording import Recording, segments
-from lg_husky_sim.resources import config_path
 import numpy as np
 import pytest
 
 STEPS = ((1.0, 0.0, 0.0), (2.0, 0.9, 0.0), (2.0, 0.5, 0.6), (2.0, -0.6, -0.5), (2.0, 0.0, -0.9),
          (2.0, 0.7, -0.4), (2.0, 0.0, 0.0))
+#: Tyres that share their grip between driving and scrubbing.
+TYRES = Effect('traction_saturation', shape='circle')
 Record = Callable[..., Recording]
 
 
@@ -46,23 +43,6 @@ def driven(record: Record, name: str, effects: Mapping[Effect, Mapping[str, floa
 
 def seen(*recordings: Recording) -> Observations:
     return observations([part for one in recordings for part in segments(one)])
-
-
-def test_limited_grip_is_given_to_a_base_that_has_it(record: Record) -> None:
-    model = load_model()
-    data = seen(driven(record, 'base1', {TYRES: {'traction_torque': 2.0}}, 1))
-    plain = recalibrate(data, model.structure, model.parameters)
-    fit = with_adhesion(data, plain, model.parameters)
-    assert fit.structure.effects == (TYRES,)
-    assert fit.parameters['traction_torque'] == pytest.approx(2.0, rel=0.15)
-    assert with_adhesion(data, fit, model.parameters) is fit
-
-
-def test_a_base_that_holds_the_ground_stays_as_it_is(record: Record) -> None:
-    model = load_model()
-    data = seen(driven(record, 'base1', {}, 1))
-    plain = recalibrate(data, model.structure, model.parameters)
-    assert with_adhesion(data, plain, model.parameters) is plain
 
 
 @pytest.mark.parametrize(('part', 'named'), [(0.4, []), (1.0, ['voltage_saturation'])])
@@ -112,23 +92,3 @@ def test_ground_limits_and_rivals_are_what_they_are_called(record: Record) -> No
         ('terrain_change', 110.0), ('yaw_scrub_coulomb', 100.0)))
     assert rank(ground) < rank(other)
     assert rank(replace(ground, held_out=120.0)) > rank(other)
-
-
-@pytest.mark.parametrize(('there', 'instead', 'named'), [
-    ('loop_gain: 1.0', 'loop_gain: -1.0', r'bases\.unlimited\.loop_gain = -1\.0 .* between 0 and'),
-    ('loop_gain: 1.0', 'loop_gain: fast', "bases.unlimited.loop_gain = 'fast' is not a number"),
-    ('latency: 0.05 ', 'lateness: 0.05 ', 'bases.quick has .*lateness.*it needs .*latency'),
-    ('tyres:', 'wheels:', 'cannot be understood')])
-def test_wrong_starts_are_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                          there: str, instead: str, named: str) -> None:
-    text = config_path('closed_base.yaml').read_text(encoding='utf-8')
-    assert there in text
-    changed = tmp_path / 'closed_base.yaml'
-    changed.write_text(text.replace(there, instead), encoding='utf-8')
-    monkeypatch.setattr(closed_base, 'config_path', lambda name: changed)
-    starts.cache_clear()
-    try:
-        with pytest.raises(DiagnosisError, match=named):
-            starts()
-    finally:
-        starts.cache_clear()

@@ -7,8 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from lg_husky_sim.diagnosis.candidates import effect_entries, neutral
-from lg_husky_sim.diagnosis.closed_base import TYRES
+from lg_husky_sim.diagnosis.candidates import neutral
 from lg_husky_sim.diagnosis.diagnose import Case
 from lg_husky_sim.diagnosis.everyday import (
     everyday_words,
@@ -17,61 +16,12 @@ from lg_husky_sim.diagnosis.everyday import (
     named_rounds,
     open_rounds,
 )
-from lg_husky_sim.diagnosis.fits import Fit, recalibrate
-from lg_husky_sim.diagnosis.held_out import plant_of
 from lg_husky_sim.diagnosis.judge import findings, is_unnamed
 from lg_husky_sim.diagnosis.unnamed import Description, Unnamed
-from lg_husky_sim.diagnosis.weighed import centred, weighed
 from lg_husky_sim.husky.effects import catalogue, Effect
-from lg_husky_sim.husky.model import compile_model
-from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.identification.noise import Metric
-from lg_husky_sim.identification.problem import Observations, observations
-from lg_husky_sim.recording import Recording, segments
-from lg_husky_sim.signals import FloatArray
 import numpy as np
 import pytest
-
-
-def _loaded(record: Callable[..., Recording], shape: str, tyres: bool
-            ) -> tuple[Fit, FloatArray, Observations]:
-    # A fit of a robot that carries 20 kg, its prediction of a drive, and the drive.
-    model = load_model()
-    drive = record('rec', compile_model(model.structure).at(model.parameters), [
-        (1.0, 0.0, 0.0), (2.0, 0.8, 0.0), (2.0, 0.4, 0.9), (2.0, 0.0, -0.8)], 3)
-    data = observations(list(segments(drive)))
-    structure, parameters = model.structure, model.parameters
-    effects = [(TYRES, {'traction_torque': 3.0})] if tyres else []
-    effects.append((Effect('payload', shape=shape), {'payload_mass': 20.0,
-                                                     'payload_inertia': 1.5}))
-    for effect, values in effects:
-        structure = structure.with_effect(effect)
-        parameters = parameters.with_entries(*effect_entries(effect, values))
-    plain = recalibrate(data, model.structure, model.parameters)
-    values = {**plain.solution.values, 'mass': parameters['mass'], 'payload_mass': 20.0,
-              'payload_inertia': 1.5}
-    fit = Fit(structure, parameters, replace(plain.solution, values=values))
-    return fit, np.asarray(data.predict(plant_of(fit))), data
-
-
-@pytest.mark.parametrize('shape', ['chassis', 'ground'])
-@pytest.mark.parametrize('tyres', [False, True])
-def test_a_payload_becomes_mass(record: Callable[..., Recording], shape: str, tyres: bool
-                                ) -> None:
-    fit, predicted, data = _loaded(record, shape, tyres)
-    found = weighed(fit)
-    assert [e.id for e in found.structure.effects] == ['traction_saturation'] * tyres
-    assert found.parameters['mass'] == pytest.approx(fit.parameters['mass'] + 20.0)
-    assert found.solution.values['mass'] == found.parameters['mass']
-    assert not {'payload_mass', 'payload_inertia'} & {*found.parameters, *found.solution.values}
-    np.testing.assert_allclose(data.predict(plant_of(found)), predicted, atol=1e-9)
-    plain = recalibrate(data, load_model().structure, load_model().parameters)
-    assert np.max(np.abs(plain.solution.predicted - predicted)) > 0.05
-    assert weighed(found) is found
-    own = centred(load_model().parameters, found)
-    assert own['mass'] == found.parameters['mass']
-    assert own.entry('mass').tolerance == load_model().parameters.entry('mass').tolerance
-    assert own['motor_resistance'] == load_model().parameters['motor_resistance']
 
 
 @pytest.mark.parametrize(('effect', 'numbers', 'expected'), [

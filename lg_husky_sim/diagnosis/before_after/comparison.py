@@ -182,7 +182,8 @@ def _candidates(base: Base, prior: Prior, quadratics: Sequence[Quadratic]
                         np.array([quantities[k].recording for k in index]),
                         np.array([quantities[k].change for k in index]))
     nothing = evidence.solve(np.zeros(0, dtype=np.intp)).evidence
-    own, others = [], []
+    own: list[Candidate] = []
+    others: list[Candidate] = []
     for change in base.settings.changes:
         if base.given and change.block != 'body':
             continue

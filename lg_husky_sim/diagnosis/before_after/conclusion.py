@@ -98,8 +98,8 @@ def mismatches(block: Block, after: Sequence[Drive], decision: Decision, setting
             for k, channel in enumerate(CHANNELS[stream]):
                 if channel not in _NAMES:
                     continue
-                width = max(1, int(round(numbers['smooth'] / max(np.median(np.diff(times)),
-                                                                 1e-9))))
+                width = max(1, round(numbers['smooth'] / max(float(np.median(np.diff(times))),
+                                                             1e-9)))
                 kernel = np.ones(width) / width
                 smooth = np.convolve(rows[:, k], kernel, 'same')
                 noise = max(float(np.std(np.convolve(later[stream][:, k], kernel, 'same'))), 1e-9)

@@ -129,7 +129,8 @@ def _diagnosis(decision: Decision, body: Block | None, loop: Block, after: Seque
                earlier: Sequence[Segment], later: Sequence[Segment], nominal: ModelFile,
                known: Settings, progress: Progress, notes: Sequence[str]) -> Diagnosis:
     named = decision.named
-    found = finding(decision, known, _p_value(decision, known), _share(decision, body, loop, after))
+    found = finding(decision, known, _p_value(decision, known),
+                    _share(decision, body, loop, after))
     about = 'robot before the change, by lg_husky diagnose'
     steps = int(known.fit['evaluations'])
     names = loop.base.names

@@ -85,7 +85,7 @@ class Drive:
 def _binned(times: FloatArray, values: FloatArray, start: float, width: float) -> Bins:
     width = max(width, float(np.median(np.diff(times)))) if times.size > 1 else width
     index = np.floor((times - start) / width).astype(np.intp)
-    _, first, counts = np.unique(index, return_index=True, return_counts=True)
+    _, counts = np.unique(index, return_counts=True)
     enough = counts >= 0.5 * np.median(counts)
     keep = np.repeat(enough, counts)
     edges = np.concatenate([[0], np.cumsum(counts[enough])[:-1]]).astype(np.intp)

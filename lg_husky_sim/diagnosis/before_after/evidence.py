@@ -110,4 +110,4 @@ class Evidence:
         covariance = np.linalg.inv(precision)
         at = covariance @ slope
         evidence = prior + 0.5 * float(slope @ at) - 0.5 * float(np.linalg.slogdet(precision)[1])
-        return Solution(evidence, at[:n], at[n:], covariance[n:, n:])
+        return Solution(evidence, at[:n], at[n:], np.asarray(covariance[n:, n:], dtype=np.float64))

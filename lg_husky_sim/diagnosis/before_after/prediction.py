@@ -13,6 +13,7 @@ from lg_husky_sim.diagnosis.before_after.settings import Quantity, Settings
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 #: Channels by stream; those of the pose are movements from one bin to the next, in the frame of
 #: the middle between them.
@@ -177,7 +178,7 @@ def residual(base: Base, drive: Drive, z: FloatArray) -> dict[str, FloatArray]:
     return {name: there[name] - should[name] for name in should}
 
 
-def jacobian(base: Base, drive: Drive, z: FloatArray, free: FloatArray
+def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
              ) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray]]:
     """
     Return the residual and its difference quotients, by stream.

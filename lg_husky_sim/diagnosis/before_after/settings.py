@@ -154,8 +154,8 @@ def _change(entry: Mapping[str, Any], known: frozenset[str]) -> Change:
         raise DiagnosisError(f'before_after.yaml: change {entry["effect"]}: block = '
                              f'{shown(entry["block"])} is neither body nor loop')
     return Change(entry['effect'], entry['side'], entry['subsystem'], entry['block'],
-                  tuple(entry['parameters']), tuple(entry.get('more', ())), entry['title'], entry['regime'],
-                  tuple(entry['elements']))
+                  tuple(entry['parameters']), tuple(entry.get('more', ())), entry['title'],
+                  entry['regime'], tuple(entry['elements']))
 
 
 def _values(content: Mapping[str, Any], section: str) -> dict[str, float]:

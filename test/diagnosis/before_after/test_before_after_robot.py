@@ -1,0 +1,200 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What changed on a commercial base: the robot that both sets are fitted with, and the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from lg_husky_sim.diagnosis.before_after import settings as settings_module
+from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT, simulate
+from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, ChangeCase
+from lg_husky_sim.diagnosis.before_after.drives import drives, mean_command
+from lg_husky_sim.diagnosis.before_after.prediction import base_of
+from lg_husky_sim.diagnosis.before_after.settings import settings
+from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.errors import DiagnosisError, RecordingError
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import Recording
+from lg_husky_sim.resources import config_path
+from lg_husky_sim.signals import FloatArray, TimeSeries
+import numpy as np
+import pytest
+
+STEP = 0.001
+#: A base as sold: a quick wheel loop, tyres on concrete.
+ROBOT_BEFORE: Mapping[str, float] = {
+    'slew_forward': 2.5, 'slew_yaw': 5.0, 'turn_width': 1.05, 'loop_feedforward': 3.5,
+    'loop_gain': 3.0, 'loop_integral': 12.0, 'dry_left': 2.1, 'dry_right': 2.4,
+    'grip_along': 0.75, 'grip_across': 0.6, 'creep_speed': 0.004, 'creep_share': 0.12,
+    'deflection': 0.006, 'com_x': 0.01, 'mass': 50.0, 'yaw_inertia': 3.3}
+#: Duration [s], forward [m/s], yaw [rad/s].
+DRIVE = ((1.0, 0.0, 0.0), (2.0, 0.9, 0.0), (2.5, 0.5, 0.8), (1.0, 0.0, 0.0), (2.5, 0.0, 1.4),
+         (2.0, -0.6, -0.5), (2.5, 0.0, -1.0), (2.0, 0.8, -0.6), (1.5, 0.0, 0.0),
+         (2.0, -0.8, 0.3), (1.0, 0.0, 0.0))
+OTHER = ((1.0, 0.0, 0.0), (2.5, 0.0, -1.3), (2.0, 0.7, 0.3), (2.0, -0.7, 0.6), (1.5, 0.0, 0.0),
+         (2.0, 0.4, -0.9), (2.0, 0.9, 0.0), (2.5, 0.0, 0.9), (2.0, 0.6, 0.7), (1.5, 0.0, 0.0))
+
+
+def driven(name: str, changes: Mapping[str, float], seed: int,
+           steps: Sequence[tuple[float, float, float]] = DRIVE, *, rate: float = 50.0,
+           low_pass: float = 0.0, late: float = 0.0, factor: float = 1.0,
+           delay: float = 0.03, accelerometer: float = 1.0) -> Recording:
+    """Return a recording of the base with other numbers, sampled as the arguments say."""
+    base = base_of(settings(), load_model().parameters)
+    values = dict(zip(base.names, base.values(base.start), strict=True))
+    values |= {'current_limit': 60.0, **ROBOT_BEFORE, **changes}
+    rng = np.random.default_rng(seed)
+    edges = np.cumsum([0.0, *(duration for duration, _, _ in steps)])
+    times = np.arange(0.0, edges[-1], 0.05) + rng.uniform(0.0, 0.004)
+    index = np.clip(np.searchsorted(edges, times, side='right') - 1, 0, len(steps) - 1)
+    commands = np.array([(v, w) for _, v, w in steps])[index]
+    count = int(edges[-1] / STEP)
+    grid = STEP * np.arange(count + 1)
+    held = commands[np.clip(np.searchsorted(times, grid[:-1] - delay, side='right') - 1, 0, None)]
+    out, heading = np.empty((count + 1, 7)), np.zeros(count + 1)
+    robot = np.concatenate([[values[n] for n in ROBOT], base.fixed])
+    # A slope needs the heading, which turns as without one.
+    for _ in range(2):
+        level = np.column_stack([np.cos(heading[:-1]), np.sin(heading[:-1])])
+        simulate(robot, STEP, held, level, np.zeros((count + 1, 2)), False, np.zeros(5), out)
+        heading = np.concatenate([[0.0], np.cumsum(STEP * out[1:, 2])])
+    x, y = (np.cumsum(STEP * one) for one in (
+        np.cos(heading) * out[:, 0] - np.sin(heading) * out[:, 1],
+        np.sin(heading) * out[:, 0] + np.cos(heading) * out[:, 1]))
+
+    def sampled(hertz: float, columns: FloatArray, noise: Sequence[float], stamped: float = 0.0
+                ) -> tuple[FloatArray, FloatArray]:
+        at = np.arange(0.1, edges[-1] - 0.1, 1.0 / hertz)
+        read = np.column_stack([np.interp(at, grid, c) for c in columns.T])
+        return at + stamped, read + np.array(noise) * rng.standard_normal(read.shape)
+    wheels = out[:, 3:5].copy()
+    if low_pass:
+        for k in range(1, count + 1):
+            wheels[k] = wheels[k - 1] + (out[k, 3:5] - wheels[k - 1]) * STEP / low_pass
+    imu = np.column_stack([factor * out[:, 2], out[:, 5], out[:, 6]])
+    imu[:, 1:] *= accelerometer
+    streams = {
+        'command': TimeSeries(times, commands, ('forward', 'yaw')),
+        'wheels': TimeSeries(*sampled(rate, wheels, (0.01, 0.01)), ('left', 'right')),
+        'imu': TimeSeries(*sampled(rate, imu, (0.004, 0.05 * accelerometer,
+                                               0.05 * accelerometer), late),
+                          ('yaw_rate', 'accel_x', 'accel_y')),
+        'pose': TimeSeries(*sampled(25.0, np.column_stack([x, y, heading]), (
+            0.004, 0.004, 0.004)), ('x', 'y', 'heading'))}
+    return Recording(name, name, streams, 0, frames=('odom', 'base_link'))
+
+
+def silent(text: str, share: float) -> None:
+    """Take progress and say nothing."""
+
+
+def changed(changes: Mapping[str, float], **how: float) -> ChangeCase:
+    """Return what is said of two drives before and two after a change."""
+    both = {name: value for name, value in how.items() if name in ('rate', 'low_pass',
+                                                                   'accelerometer')}
+    before = [driven('base1', {}, 1, **both), driven('base2', {}, 2, OTHER, **both)]
+    later = [driven('rec1', changes, 3, OTHER, **how), driven('rec2', changes, 4, **how)]
+    return change_case(later, before, load_model(), silent, jobs=2)
+
+
+def test_nothing_changed_between_drives_of_one_robot() -> None:
+    """Named in the other order, and with one drive exchanged between the sets."""
+    case = changed({})
+    assert case.diagnosis.verdict is Verdict.NOTHING_MISSING
+    assert case.diagnosis.findings == ()
+    swapped = change_case(
+        [driven('base1', {}, 1), driven('rec1', {}, 3, OTHER)],
+        [driven('base2', {}, 2, OTHER), driven('rec2', {}, 4)], load_model(), silent)
+    assert swapped.diagnosis.verdict is Verdict.NOTHING_MISSING
+
+
+@pytest.mark.parametrize(('changes', 'effect', 'side', 'parameter'), [
+    ({'grip_along': 0.45, 'grip_across': 0.36}, 'terrain_change', 'both', 'grip_across'),
+    ({'com_x': -0.05}, 'com_shift', 'both', 'com_x'),
+    ({'radius_right': 0.1618}, 'wheel_radius_mismatch', 'right', 'radius_right'),
+    ({'dry_left': 6.5}, 'coulomb_drivetrain', 'left', 'dry_left'),
+    ({'current_limit': 4.0}, 'current_limit', 'both', 'current_limit'),
+    ({'slope_x': 0.4, 'slope_y': -0.3}, 'slope', 'both', 'slope_x'),
+    ({'slew_forward': 1.0, 'slew_yaw': 2.0}, 'command_slew', 'both', 'slew_forward')])
+def test_a_change_is_named_with_its_number(changes: Mapping[str, float], effect: str, side: str,
+                                           parameter: str) -> None:
+    said = changed(changes).diagnosis
+    (finding,) = said.findings
+    assert (finding.effect, finding.side, finding.onset) == (effect, side, None)
+    number = next(one for one in finding.parameters if one.name == parameter)
+    assert number.low < number.value < number.high
+    assert number.value == pytest.approx(changes[parameter], rel=0.3, abs=0.01)
+    assert finding.held_out_gain > settings().decision['claim']
+
+
+@pytest.mark.parametrize(('how', 'effect'), [
+    ({'delay': 0.12}, 'command_latency'), ({'factor': 0.93}, 'gyro_scale'),
+    ({'late': 0.06}, 'sensor_time_offset')])
+def test_other_logs_show_the_same(how: Mapping[str, float], effect: str) -> None:
+    """Wheel rates at 20 Hz through a low-pass, and no accelerometer."""
+    said = changed({}, rate=20.0, low_pass=0.08, accelerometer=0.0, **how).diagnosis
+    assert [one.effect for one in said.findings] == [effect]
+
+
+def test_the_order_of_recordings_does_not_matter() -> None:
+    before = [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)]
+    later = [driven('rec1', {'com_x': -0.05}, 3, OTHER), driven('rec2', {'com_x': -0.05}, 4)]
+    one, other = (change_case(a, b, load_model(), silent).decision
+                  for a, b in ((later, before), (later[::-1], before[::-1])))
+    assert one.named is not None
+    assert other.named is not None
+    assert one.named.change == other.named.change
+    assert one.named.gain == pytest.approx(other.named.gain, rel=1e-3)
+    assert one.confidence == pytest.approx(other.confidence, abs=1e-3)
+
+
+def test_the_model_that_is_written_drives_like_the_robot_after() -> None:
+    said = diagnose([driven('rec1', {'dry_left': 6.5}, 3, OTHER),
+                     driven('rec2', {'dry_left': 6.5}, 4)], load_model(), silent,
+                    [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)]).diagnosis
+    assert said.augmented['wheel_speed_rmse'] < said.plain['wheel_speed_rmse']
+    assert {'speed_loop', 'command_latency'} <= {e.id for e in said.model.structure.effects}
+    assert said.mismatch[0].subsystem == 'drivetrain'
+
+
+def test_a_recording_that_is_too_short_is_refused_by_name() -> None:
+    whole = driven('rec1', {}, 3)
+    short = Recording('short', 'short', {
+        name: series.slice(0.0, 0.5) for name, series in whole.streams.items()}, 0)
+    with pytest.raises(RecordingError, match='recording short has no stretch of 3 s'):
+        change_case([whole], [short], load_model(), silent)
+
+
+def test_a_delayed_command_is_averaged_over_each_step() -> None:
+    whole = driven('rec1', {}, 3)
+    known = settings()
+    (drive,) = drives(whole, 0.004, known.bins, 1.0, 3.0)
+    total = mean_command(drive, 0.004, 0.0)
+    later = mean_command(drive, 0.004, 0.1)
+    np.testing.assert_allclose(later[25:], total[:-25], atol=1e-9)
+    assert np.max(np.abs(total)) <= 1.4 + 1e-12
+
+
+@pytest.mark.parametrize(('there', 'instead', 'named'), [
+    ('scale: log, start: 3.0', 'scale: cubic, start: 3.0', "scale = 'cubic' is neither"),
+    ('effect: slope, side: both, subsystem: translation, block: body',
+     'effect: slope, side: both, subsystem: translation, block: head', "block = 'head'"),
+    ('parameters: [dead_time]', 'parameters: [dad_time]', "unknown parameter 'dad_time'"),
+    ('sd: 1.0, lower: 0.05, upper: 50.0', 'sd: wide, lower: 0.05, upper: 50.0',
+     "slew_forward.sd = 'wide' is not a number")])
+def test_wrong_settings_are_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                            there: str, instead: str, named: str) -> None:
+    text = config_path('before_after.yaml').read_text(encoding='utf-8')
+    assert there in text
+    path = tmp_path / 'before_after.yaml'
+    path.write_text(text.replace(there, instead, 1), encoding='utf-8')
+    monkeypatch.setattr(settings_module, 'config_path', lambda name: path)
+    settings.cache_clear()
+    try:
+        with pytest.raises(DiagnosisError, match=named):
+            settings()
+    finally:
+        settings.cache_clear()
