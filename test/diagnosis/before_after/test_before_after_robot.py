@@ -39,7 +39,7 @@ OTHER = ((1.0, 0.0, 0.0), (2.5, 0.0, -1.3), (2.0, 0.7, 0.3), (2.0, -0.7, 0.6), (
 
 
 def driven(name: str, changes: Mapping[str, float], seed: int,
-           steps: Sequence[tuple[float, float, float]] = DRIVE, *, rate: float = 50.0,
+           steps: Sequence[tuple[float, float, float]] = DRIVE, /, *, rate: float = 50.0,
            low_pass: float = 0.0, late: float = 0.0, factor: float = 1.0,
            delay: float = 0.03, accelerometer: float = 1.0) -> Recording:
     """Return a recording of the base with other numbers, sampled as the arguments say."""
