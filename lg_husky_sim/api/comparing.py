@@ -107,8 +107,9 @@ class Comparison:
         numpy.ndarray of matplotlib Axes, shape (4,)
         """
         require('matplotlib', 'draw figures')
-        from lg_husky_sim.comparison.figures import draw_response, draw_trajectory, line_styles
-        from lg_husky_sim.comparison.metrics import measured_channels
+        from lg_husky_sim.comparison.traces import traces_of
+        from lg_husky_sim.reporting.pictures import draw_path, draw_signal
+        from lg_husky_sim.reporting.styles import column_styles
 
         if axes is None:
             from matplotlib import pyplot
@@ -118,13 +119,14 @@ class Comparison:
             raise CommandError(f'{len(axes)} axes given; a comparison is drawn into 4')
         outcome = self.outcomes[recording]
         part = max(outcome.segments, key=lambda one: one.segment.duration)
-        styles = line_styles(self.labels)
-        if part.tracks:
-            draw_trajectory(axes[0], part.tracks, styles)
-        measured = measured_channels(part.segment)
+        styles = column_styles(self.labels)
+        traces = {one.channel: one for one in traces_of(
+            [(part.segment, part.predictions)], self.labels)}
+        if 'x' in traces:
+            draw_path(axes[0], traces['x'], traces['y'], styles)
         for axis, channel in zip(axes[1:], ('forward', 'wheel_right', 'yaw_rate'), strict=True):
-            draw_response(axis, measured.get(channel), part.predictions, channel, styles,
-                          part.segment.start)
+            if channel in traces:
+                draw_signal(axis, traces[channel], styles)
             axis.set_xlabel('time [s]')
         axes[0].legend()
         return np.array(list(axes), dtype=object)
@@ -138,7 +140,7 @@ class Comparison:
         folder : path-like
             Made, or files of an earlier run in it replaced.
         figures : int
-            Segments of each recording that get pictures, the longest ones.
+            Recordings whose signals and path are drawn as PNG too, the first ones.
         progress : callable, optional
 
         Returns
@@ -146,10 +148,11 @@ class Comparison:
         pathlib.Path
             The page.
         """
-        from lg_husky_sim.comparison.page import MARKER, pictured, write_files
+        from lg_husky_sim.comparison.page import MARKER, PAGE, write_files
+        from lg_husky_sim.reporting.provenance import provenance
 
         target = Path(folder)
-        total = sum(1 for outcome in self.outcomes for _ in pictured(outcome, figures))
+        total = 1 + 2 * min(figures, len(self.outcomes))
         drawn = iter(range(total))
 
         def each() -> None:
@@ -157,8 +160,10 @@ class Comparison:
                 progress('drawing', (next(drawn, total) + 1) / max(total, 1))
         with result_folder(target, MARKER) as made:
             write_files(made, self.outcomes, self.plants, self.horizon, figures, self.settings,
-                        each)
-        return target / 'index.html'
+                        each, provenance(
+                            [(one.recording.name, one.recording.path) for one in self.outcomes],
+                            [(named.label, named.path) for named in self.plants]))
+        return target / PAGE
 
     def save_bag(self, path: PathLike, *, recording: int = 0, overwrite: bool = False) -> Path:
         """

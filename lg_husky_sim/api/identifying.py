@@ -21,6 +21,7 @@ from lg_husky_sim.identification.estimate import estimate
 from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.identification.report import write_fit
 from lg_husky_sim.identification.result import FitResult, Method
+from lg_husky_sim.reporting.provenance import provenance
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +37,14 @@ class Fit:
         That were fitted.
     before : Husky
         The model as it was given.
+    sources : tuple of (str, str)
+        Name and path of each recording.
     """
 
     result: FitResult
     segments: tuple[rec.Segment, ...]
     before: Husky
+    sources: tuple[tuple[str, str], ...] = ()
 
     @property
     def husky(self) -> Husky:
@@ -101,11 +105,12 @@ class Fit:
         matplotlib Axes
         """
         require('matplotlib', 'draw figures')
-        from lg_husky_sim.identification.pictures import draw_intervals
+        from lg_husky_sim.reporting.pictures import draw_intervals
         if ax is None:
             from matplotlib import pyplot
             ax = pyplot.gca()
-        draw_intervals(ax, self.result.estimates)
+        draw_intervals(ax, [(one.name, one.unit, one.value, one.low, one.high)
+                            for one in self.result.estimates])
         return ax
 
     def save(self, path: PathLike) -> tuple[Path, ...]:
@@ -127,7 +132,8 @@ class Fit:
         SettingsError
             If the name cannot be used.
         """
-        return write_fit(self.result, self.segments, self.before.model, Path(path))
+        return write_fit(self.result, self.segments, self.before.model, Path(path),
+                         provenance(self.sources))
 
     def report(self, path: PathLike | None = None) -> Path:
         """Write everything, into a temporary folder by default; return the page."""
@@ -167,4 +173,4 @@ def identify(husky: Husky, recordings: Recordings, free: Iterable[str] = (), *,
                           nuisance=tuple(nuisance), profiles=tuple(profiles), seed=seed,
                           starts=starts, jobs=jobs, scheduler=scheduler, baseline=husky.model,
                           progress=lambda word: report(f'fitting: {word}', None))
-    return Fit(result, parts, husky)
+    return Fit(result, parts, husky, tuple((one.name, one.path) for one in read))

@@ -35,7 +35,8 @@ from lg_husky_sim.cli.several import SeveralWords
               help='Start anew from the measured state after so many seconds; by default only '
                    'at gaps.')
 @click.option('--figures', 'most', type=click.IntRange(min=0), default=6, show_default=True,
-              metavar='N', help='Segments of each recording that get pictures.')
+              metavar='N',
+              help='Recordings whose signals and path are drawn as PNG too, the first ones.')
 @click.option('--bag', type=click.Path(path_type=Path), metavar='BAG',
               help='Write measured, predicted and residual of the first REC as a rosbag2, with '
                    'layouts for Foxglove and PlotJuggler beside it.')
@@ -56,11 +57,11 @@ def command(
     recordings in the order in which they were driven; a folder stands for all bags in it.
     """
     from lg_husky_sim.api.comparing import compare
-    from lg_husky_sim.comparison.page import check_extras
     from lg_husky_sim.folders import check_folder
     from lg_husky_sim.husky.model_file import parse_settings
     from lg_husky_sim.recording import TopicMap
     from lg_husky_sim.recording.writer import check_target
+    from lg_husky_sim.reporting.write import check_extras
 
     check_extras()
     check_folder(out)

@@ -65,8 +65,9 @@ def command(
     from lg_husky_sim.evaluation.session import Request, run_evaluation
     from lg_husky_sim.folders import check_folder
     from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
-    from lg_husky_sim.identification.pages import check_extras
     from lg_husky_sim.recording import TopicMap
+    from lg_husky_sim.reporting.provenance import provenance
+    from lg_husky_sim.reporting.write import check_extras
 
     check_extras()
     check_folder(out)
@@ -82,7 +83,10 @@ def command(
     request = Request(chosen, calibrate, held_out, rivals, steps, start, seed, starts, jobs,
                       TopicMap.parse(topics))
     with say.stages(known=False) as report:
-        text = run_evaluation(request, out, lambda word: report(f'evaluating: {word}', None))
+        text = run_evaluation(
+            request, out, lambda word: report(f'evaluating: {word}', None), provenance(
+                [(Path(path).name, path) for path in (*calibrate, *held_out, *rivals, *steps)],
+                [('of --model', model)] if model else []))
     say.result(text)
     say.remark('')
     say.written(out / 'index.html')

@@ -74,9 +74,9 @@ def command(
     from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.husky.model_file import parse_settings
     from lg_husky_sim.identification.options import names_in
-    from lg_husky_sim.identification.pages import check_extras
     from lg_husky_sim.identification.report import report_paths
     from lg_husky_sim.recording import TopicMap
+    from lg_husky_sim.reporting.write import check_extras
 
     check_extras()
     if not each:

@@ -22,6 +22,7 @@ from lg_husky_sim.comparison.rival import rival_prediction
 from lg_husky_sim.errors import CommandError, RecordingError
 from lg_husky_sim.recording import Recording, Segment, segments, windows
 from lg_husky_sim.recording.names import printable
+from lg_husky_sim.reporting.words import quantity_with_unit
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 
@@ -180,10 +181,10 @@ def text_table(outcomes: Sequence[RecordingOutcome]) -> str:
                   f'segment{"s" if count != 1 else ""}',
                   f'  {"root mean square error":<28}' + ''.join(f'{n:>{width}}' for n in names)]
         errors = {name: outcome.errors(name) for name in names}
-        for channel, unit in UNITS.items():
+        for channel in UNITS:
             if any(channel in errors[name] for name in names):
                 cells = ''.join(f'{_cell(errors[name].get(channel)):>{width}}' for name in names)
-                lines.append(f'  {channel + " [" + unit + "]":<28}{cells}')
+                lines.append(f'  {quantity_with_unit(channel):<28}{cells}')
         if any(part.tracks for part in outcome.segments):
             lines.append(f'  {"largest tracking error":<28}')
             bounds = {name: outcome.bounds(name) for name in names}

@@ -1,53 +1,45 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A comparison as files: table, JSON, pictures, and one page that holds them all."""
+"""A comparison as files: JSON and table, then the page and its pictures."""
 
 from __future__ import annotations
 
-from base64 import b64encode
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 import json
 import math
 from pathlib import Path
-import re
-from typing import TYPE_CHECKING
 
-from lg_husky_sim.comparison.figures import line_styles, responses_figure, trajectory_figure
-from lg_husky_sim.comparison.metrics import UNITS
 from lg_husky_sim.comparison.models import NamedPlant
-from lg_husky_sim.comparison.outcome import (
-    as_json,
-    labels,
-    RecordingOutcome,
-    SegmentOutcome,
-    text_table,
-)
-from lg_husky_sim.extras import require
+from lg_husky_sim.comparison.outcome import as_json, labels, RecordingOutcome, text_table
+from lg_husky_sim.comparison.slopes import WINDOW
+from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
 from lg_husky_sim.recording.names import printable
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from lg_husky_sim.reporting.data import ErrorTable, Headline, Provenance, ReportData, Trace
+from lg_husky_sim.reporting.words import (
+    capitalised,
+    number,
+    plural,
+    quantity,
+    quantity_with_unit,
+    SIGN,
+    with_unit,
+)
+from lg_husky_sim.reporting.write import write_report
+import numpy as np
 
 MARKER = 'compare.json'
 """File that tells a folder of comparisons."""
-LONGEST_VIEW = 60.0
-"""Longest time shown in one picture of responses [s]; more cannot be read."""
-DOTS = 130
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A picture file of one segment, and what it shows."""
-
-    path: Path
-    alt: str
+PAGE = 'index.html'
+#: Quantities by which models are ranked, the first that was recorded: what a robot is for.
+RANKED = ('position', 'wheel_speed', 'yaw_rate', 'forward')
+#: Share of the error of the forward speed from which the scatter of the pose is worth a note.
+SCATTER = 0.3
 
 
 def write_files(
     folder: Path, outcomes: Sequence[RecordingOutcome], plants: Sequence[NamedPlant],
     horizon: float = 0.0, most: int = 6, settings: Mapping[str, float] | None = None,
-    on_progress: Callable[[], object] | None = None,
+    on_progress: Callable[[], object] | None = None, provenance: Provenance | None = None,
 ) -> tuple[Path, ...]:
     """
     Write compare.json, compare.txt, the pictures and index.html.
@@ -61,11 +53,12 @@ def write_files(
     horizon : float
         As it was compared with.
     most : int
-        Segments of a recording that get pictures, the longest ones.
+        Recordings that get pictures, the first ones.
     settings : mapping of str to float, optional
         Parameters that were overridden in every model.
     on_progress : callable, optional
-        Called after the pictures of each segment.
+        Called after each picture.
+    provenance : Provenance, optional
 
     Returns
     -------
@@ -77,111 +70,104 @@ def write_files(
     MissingExtraError
         If matplotlib or jinja2 is not installed.
     """
-    check_extras()
-    data = as_json(outcomes, plants, horizon, settings)
-    names = labels(outcomes)
-    rivals = [name for name in names if name not in {named.label for named in plants}]
-    styles = line_styles(names, rivals)
-    pictures: list[list[Picture]] = []
-    for place, outcome in enumerate(outcomes):
-        made: list[Picture] = []
-        for index, part in pictured(outcome, most):
-            stem = f'{place + 1:02d}_{_safe(outcome.recording.name)}_{index + 1:02d}'
-            title = outcome.recording.name
-            if len(outcome.segments) > 1:
-                title += f', segment {index + 1} of {len(outcome.segments)}'
-            figure = responses_figure(part.segment, part.predictions, styles, title, LONGEST_VIEW)
-            made.append(_save(figure, folder / f'{stem}_responses.png', f'Responses: {title}'))
-            if part.tracks:
-                figure = trajectory_figure(part.segment, part.tracks, styles, title, LONGEST_VIEW)
-                made.append(_save(figure, folder / f'{stem}_trajectory.png',
-                                  f'Trajectory and tracking error: {title}'))
-            if on_progress is not None:
-                on_progress()
-        pictures.append(made)
     (folder / 'compare.txt').write_text(text_table(outcomes), encoding='utf-8')
-    (folder / 'index.html').write_text(
-        _page(outcomes, plants, names, pictures, horizon, most, settings or {}), encoding='utf-8')
     (folder / MARKER).write_text(
-        json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + '\n', encoding='utf-8')
-    return tuple(picture.path for made in pictures for picture in made)
+        json.dumps(as_json(outcomes, plants, horizon, settings), indent=1, ensure_ascii=False,
+                   allow_nan=False) + '\n', encoding='utf-8')
+    data = report_data(outcomes, plants, horizon, settings, provenance)
+    return write_report(data, folder, PAGE, pictured=most, on_progress=on_progress)
 
 
-def check_extras() -> None:
+def report_data(
+    outcomes: Sequence[RecordingOutcome], plants: Sequence[NamedPlant], horizon: float = 0.0,
+    settings: Mapping[str, float] | None = None, provenance: Provenance | None = None,
+) -> ReportData:
     """
-    Check that pictures and page can be made.
+    Return a comparison as the values of a report, a column for each model and rival.
 
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib or jinja2 is not installed.
+    Parameters
+    ----------
+    outcomes : sequence of RecordingOutcome
+    plants : sequence of NamedPlant
+    horizon : float
+    settings : mapping of str to float, optional
+    provenance : Provenance, optional
+
+    Returns
+    -------
+    ReportData
     """
-    require('matplotlib', 'draw figures')
-    require('jinja2', 'write a page')
+    columns = labels(outcomes)
+    parts: list[Predicted] = [(part.segment, part.predictions) for outcome in outcomes
+                              for part in outcome.segments]
+    tables = [error_table('All recordings' if len(outcomes) > 1 else outcomes[0].recording.name,
+                          parts, columns)]
+    if len(outcomes) > 1:
+        tables += recording_tables(parts, columns)
+    traces = traces_of(parts, columns)
+    about = [(named.label, f'`{printable(named.path)}`'
+              + (f', {named.model.about}' if named.model.about else '')) for named in plants]
+    about += [(name, 'another recording of the same drive') for name in columns
+              if name not in {named.label for named in plants}]
+    seconds = sum(segment.duration for segment, _ in parts)
+    notes = [f'The commands were replayed from the measured state at the start of each of '
+             f'{plural(len(parts), "segment")}'
+             + (f', anew every {horizon:g} s' if horizon else '')
+             + f'. Errors are {SIGN}; x is ahead and y to the left of the robot as it stood at '
+             'the start.']
+    if settings:
+        notes.append('Set in every model: ' + ', '.join(
+            f'`{name} = {value:g}`' for name, value in settings.items()) + '.')
+    notes += _scatter_notes(traces)
+    notes += [f'{outcome.recording.name}: {note}' for outcome in outcomes
+              for note in (*outcome.recording.notes, *outcome.gaps())]
+    names = ', '.join(outcome.recording.name for outcome in outcomes)
+    return ReportData(
+        f'Comparison with {names}', _headline(tables[0], len(outcomes), seconds), columns,
+        tuple(about), traces, tuple(tables), notes=tuple(notes),
+        files=(('compare.json', 'has all numbers'), ('compare.txt', 'has the tables')),
+        provenance=provenance or Provenance())
 
 
-def pictured(outcome: RecordingOutcome, most: int) -> Iterator[tuple[int, SegmentOutcome]]:
-    """Yield the longest segments with their numbers, in order of time."""
-    by_length = sorted(range(len(outcome.segments)),
-                       key=lambda k: (-outcome.segments[k].segment.duration, k))
-    for index in sorted(by_length[:most]):
-        yield index, outcome.segments[index]
+def _headline(table: ErrorTable, recordings: int, seconds: float) -> Headline:
+    rows = {row.name: row for row in table.rows}
+    shown = [quantity_with_unit(one) for one in RANKED]
+    key = next((one for one in RANKED if quantity_with_unit(one) in rows), '')
+    drives = ('Recordings', f'{recordings}, {seconds:.0f} s')
+    if not key:
+        return Headline('No error can be computed', facts=(drives,))
+    unit = quantity_with_unit(key).partition('[')[2].rstrip(']')
+    values = {name: value for name, value in rows[quantity_with_unit(key)].values.items()
+              if math.isfinite(value)}
+    best = min(values, key=lambda name: values[name])
+    facts = (*((name, with_unit(value, unit)) for name, value in values.items()), drives)
+    if len(values) == 1:
+        others = tuple((f'{capitalised(row.name.split(" [")[0])} error',
+                        with_unit(row.values[best], row.name.partition('[')[2].rstrip(']')))
+                       for row in table.rows if row.name in shown)
+        return Headline(f'{best}: {with_unit(values[best], unit)} root mean square '
+                        f'{quantity(key)} error', facts=(*others, drives))
+    second = min(value for name, value in values.items() if name != best)
+    return Headline(
+        f'Closest to the recordings: {best}', facts=facts,
+        sentences=(f'Its root mean square {quantity(key)} error is '
+                   f'{with_unit(values[best], unit)}; the next one has '
+                   f'{with_unit(second, unit)}.',))
 
 
-def _save(figure: Figure, path: Path, alt: str) -> Picture:
-    figure.savefig(path, dpi=DOTS, metadata={'Software': None})
-    return Picture(path, alt)
-
-
-def _page(
-    outcomes: Sequence[RecordingOutcome], plants: Sequence[NamedPlant], names: Sequence[str],
-    pictures: Sequence[Sequence[Picture]], horizon: float, most: int,
-    settings: Mapping[str, float],
-) -> str:
-    from jinja2 import Environment, PackageLoader
-    environment = Environment(
-        loader=PackageLoader('lg_husky_sim.comparison', '.'), autoescape=True,
-        trim_blocks=True, lstrip_blocks=True)
-    recordings = [{
-        'name': outcome.recording.name,
-        'path': printable(outcome.recording.path),
-        'seconds': sum(part.segment.duration for part in outcome.segments),
-        'segments': len(outcome.segments),
-        'rows': _rows(outcome, names),
-        'notes': (*outcome.recording.notes, *outcome.gaps()),
-        'pictures': [{'data': b64encode(picture.path.read_bytes()).decode('ascii'),
-                      'alt': picture.alt} for picture in made],
-        'left_out': max(0, len(outcome.segments) - most),
-    } for outcome, made in zip(outcomes, pictures, strict=True)]
-    return environment.get_template('page.html.j2').render(
-        title='Model and recording compared', labels=names, recordings=recordings,
-        horizon=horizon, settings=settings,
-        models=[{'label': named.label, 'path': named.path, 'about': named.model.about}
-                for named in plants])
-
-
-def _rows(outcome: RecordingOutcome, names: Sequence[str]) -> list[dict[str, object]]:
-    errors = {name: outcome.errors(name) for name in names}
-    rows = []
-    for channel, unit in UNITS.items():
-        values = [errors[name][channel].rmse if channel in errors[name] else math.nan
-                  for name in names]
-        rows.append(_row(f'{channel} [{unit}]', values))
-    bounds = [outcome.bounds(name) for name in names]
-    rows.append(_row('largest |X| error [m]', [pair[0] for pair in bounds]))
-    rows.append(_row('largest |Y| error [m]', [pair[1] for pair in bounds]))
-    return [row for row in rows if row]
-
-
-def _row(name: str, values: Sequence[float]) -> dict[str, object]:
-    known = [value for value in values if math.isfinite(value)]
-    if not known:
-        return {}
-    return {'name': name, 'cells': [
-        {'text': f'{value:.4f}' if math.isfinite(value) else '–',
-         'best': len(known) > 1 and value == min(known)} for value in values]}
-
-
-def _safe(name: str) -> str:
-    """Return a name that is fit for a file."""
-    return re.sub(r'[^A-Za-z0-9_-]+', '_', name)[:60] or 'recording'
+def _scatter_notes(traces: Sequence[Trace]) -> list[str]:
+    # The rate of change of a noisy pose is noisy: that part of the error is no model's.
+    said = []
+    for trace in (one for one in traces if one.channel == 'forward'):
+        step = max(1, round(WINDOW / max(float(np.median(np.diff(trace.times))), 1e-3)))
+        bends = np.diff(trace.measured[::step], 2)  # slopes that share no sample
+        bends = bends[np.isfinite(bends)]
+        errors = [trace.measured - values for values in trace.predicted.values()]
+        if not bends.size or not errors:
+            continue
+        scatter = float(np.median(np.abs(bends))) / 0.6745 / math.sqrt(6.0)
+        if scatter > SCATTER * min(float(np.sqrt(np.nanmean(error ** 2))) for error in errors):
+            said.append(f'{trace.recording}: the measured forward speed is the rate of change of '
+                        f'the pose, and scatters by at least {number(scatter, 2)} m/s by itself: '
+                        'that much of its error is no fault of a model.')
+    return said

@@ -151,7 +151,10 @@ def error_table(title: str, parts: Sequence[Predicted], columns: Sequence[str], 
                             default=math.nan) for name, own in bounds.items()}
         if any(map(math.isfinite, values.values())):
             rows.append(ErrorRow(quantity_with_unit(key), values))
-    return ErrorTable(title, tuple(rows), tuple(columns), held_out, compared)
+    note = '' if not intervals else (
+        f'In brackets its 95 % interval, from resampling blocks of {BLOCK:g} s, so that '
+        'correlated errors count once.')
+    return ErrorTable(title, tuple(rows), tuple(columns), held_out, compared, note)
 
 
 def change_intervals(parts: Sequence[Predicted], before: str, after: str

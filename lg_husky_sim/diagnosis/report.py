@@ -316,8 +316,9 @@ def report_data(
         tuple(Mismatch(m.recording, _SIGNALS.get(m.channel, m.channel), m.start,
                        m.end, m.strength, m.subsystem)
               for m in diagnosis.mismatch),
-        tuple(parameters), (*found_numbers(diagnosis), *competing(diagnosis), *sections), notes,
-        (('model.yaml', 'is the model with the finding' if diagnosis.findings
-          else 'is the recalibrated model'),
-         ('plain.yaml', 'is the recalibrated model without it'),
-         ('diagnosis.json', 'has all numbers')), provenance or Provenance())
+        tuple(parameters),
+        sections=(*found_numbers(diagnosis), *competing(diagnosis), *sections), notes=notes,
+        files=(('model.yaml', 'is the model with the finding' if diagnosis.findings
+                else 'is the recalibrated model'),
+               ('plain.yaml', 'is the recalibrated model without it'),
+               ('diagnosis.json', 'has all numbers')), provenance=provenance or Provenance())

@@ -73,9 +73,7 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
         for stretch in _stretches(case.segments)]
     pair = (columns[-2], columns[-1])
     tables = [*_held_out(case, columns),
-              replace(error_table('On all data', parts, columns, compared=pair), note=(
-                  'In brackets its 95 % interval, from resampling blocks of 5 s, so that '
-                  'correlated errors count once.'))]
+              error_table('On all data', parts, columns, compared=pair)]
     if len({s.recording for s in case.segments}) > 1:
         tables += [replace(table, title=f'Recording {table.title}', folded=True)
                    for table in recording_tables(parts, columns, pair)]

@@ -4,17 +4,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 import math
 from typing import Any
 
-from lg_husky_sim.comparison.figures import line_styles, responses_figure, trajectory_figure
+from lg_husky_sim.comparison.traces import Predicted, traces_of
 from lg_husky_sim.evaluation.engine import engine_config
 from lg_husky_sim.evaluation.paper_case import CaseResult, GENETIC, NOMINAL, SQUARES
-from lg_husky_sim.identification.pages import Picture, picture, Section, Table
 from lg_husky_sim.identification.paper import paper
-from lg_husky_sim.identification.pictures import convergence_figure
+from lg_husky_sim.identification.report import convergence_chart
+from lg_husky_sim.reporting.data import ErrorRow, ErrorTable, Headline, ReportData
+from lg_husky_sim.reporting.pictures import path_picture, responses_picture
+from lg_husky_sim.reporting.sections import Chart, Drawing, Section, Table
 
+PRINTED = 'printed in the paper'
 #: Numbers of the paper's figures of trajectories, in the order of its manoeuvres.
 FIRST_TRAJECTORY = 14
 
@@ -36,7 +40,22 @@ def table(result: CaseResult) -> Table:
             use = 'held out' if drive.held_out else 'calibration'
             rows.append((f'{drive.name} max |{letter}| ({use})', *cells,
                          f'{stated[axis]:.4f}' if stated else '–'))
-    return Table(('largest tracking error [m]', *result.labels, 'printed in the paper'), rows)
+    return Table(('largest tracking error [m]', *result.labels, PRINTED), rows)
+
+
+def papers_numbers(result: CaseResult) -> ErrorTable:
+    """Return the paper's six numbers as a table of errors."""
+    reference = paper().tracking_error
+    rows = []
+    for drive in result.drives:
+        for axis, letter in enumerate('XY'):
+            values = {label: drive.bounds(label)[axis] for label in result.labels}
+            if drive.name in reference:
+                values[PRINTED] = reference[drive.name][axis]
+            use = 'held out' if drive.held_out else 'calibration'
+            rows.append(ErrorRow(f'{drive.name} |{letter}|, {use} [m]', values))
+    return ErrorTable(f'{result.case.name}: largest tracking errors', tuple(rows),
+                      (*result.labels, PRINTED))
 
 
 def parameter_table(result: CaseResult) -> Table:
@@ -58,6 +77,13 @@ def parameter_table(result: CaseResult) -> Table:
             f'{truth[one.name]:g}' if one.name in truth else '–',
             f'{known.result:g}' if known else '–'))
     return Table(('estimate', 'genetic algorithm', 'least squares (95 %)', 'truth', 'paper'), rows)
+
+
+def closest(result: CaseResult) -> str:
+    """Return the model with the smallest largest error on held-out drives; empty without one."""
+    held = [drive for drive in result.drives if drive.held_out]
+    return min(result.labels, key=lambda label: max(max(drive.bounds(label)) for drive in held)
+               ) if held else ''
 
 
 def verdict(result: CaseResult) -> list[str]:
@@ -90,7 +116,7 @@ def verdict(result: CaseResult) -> list[str]:
             f'B_H/B is {ratio[0]:.3g} by the genetic algorithm and {ratio[1]:.3g} by least '
             'squares; the position alone (eq. 23) says little about either damping by itself.')
     if rival in result.labels and held:
-        closer = min(result.labels, key=worst)
+        closer = closest(result)
         config = engine_config()
         if result.case.name == 'engine':
             changed = ', '.join(
@@ -109,9 +135,20 @@ def verdict(result: CaseResult) -> list[str]:
     return said
 
 
-def figures(result: CaseResult) -> list[Picture]:
+def recording_name(result: CaseResult, drive: str) -> str:
+    """Return the name of a manoeuvre of a case on a page that has several cases."""
+    return f'{result.case.name}: {drive}'
+
+
+def parts_of(result: CaseResult) -> list[Predicted]:
+    """Return the manoeuvres of a case with their predictions, under the names of the page."""
+    return [(replace(drive.segment, recording=recording_name(result, drive.name)),
+             drive.predictions) for drive in result.drives]
+
+
+def figures(result: CaseResult) -> tuple[tuple[Chart, ...], tuple[Drawing, ...]]:
     """
-    Draw Figs. 12 to 16.
+    Return Figs. 12 to 16, to be drawn.
 
     Parameters
     ----------
@@ -119,38 +156,32 @@ def figures(result: CaseResult) -> list[Picture]:
 
     Returns
     -------
-    list of Picture
-        Named fig12 to fig16; further manoeuvres go on counting.
+    tuple of Chart
+        Fig. 12.
+    tuple of Drawing
+        Named fig13 to fig16; further manoeuvres go on counting.
     """
     case = result.case.name
     shown = tuple(label for label in result.labels if label != NOMINAL)
-    styles = line_styles(shown, rivals=(result.case.rival_label,))
-    history = result.fits[GENETIC].history
-    made = [picture(convergence_figure(history),
-                    f'Fig. 12, {case}: the genetic algorithm converges', f'{case}_fig12')]
+    data = ReportData(case, Headline(case), shown, traces=traces_of(parts_of(result), shown))
     first = result.drives[0]
-    made.append(picture(
-        responses_figure(first.segment, _kept(first.predictions, shown), styles,
-                         f'{first.name} ({case})'),
-        f'Fig. 13, {case}: wheel rates, linear and rotational velocity on the {first.name}',
-        f'{case}_fig13'))
+    drawings = [Drawing(
+        f'{case}_fig13',
+        f'Fig. 13, {case}: wheel rates, forward speed and yaw rate on the {first.name}',
+        partial(responses_picture, data, recording_name(result, first.name)))]
     for number, drive in enumerate(result.drives, FIRST_TRAJECTORY):
-        made.append(picture(
-            trajectory_figure(drive.segment, _kept(drive.tracks, shown), styles,
-                              f'{drive.name} ({case})'),
-            f'Fig. {number}, {case}: trajectory and tracking error, {drive.name}',
-            f'{case}_fig{number}'))
-    return made
+        drawings.append(Drawing(
+            f'{case}_fig{number}', f'Fig. {number}, {case}: path and tracking error, {drive.name}',
+            partial(path_picture, data, recording_name(result, drive.name))))
+    return (convergence_chart(result.fits[GENETIC].history, f'{case}_fig12'),), tuple(drawings)
 
 
-def _kept(values: Any, labels: Sequence[str]) -> dict[str, Any]:
-    return {label: values[label] for label in labels}
-
-
-def section(result: CaseResult, pictures: Sequence[Picture]) -> Section:
+def section(result: CaseResult) -> Section:
     """Return the case as a section of a page."""
-    return Section(f'{result.case.name}: {result.case.about}', text=verdict(result),
-                   tables=[table(result), parameter_table(result)], pictures=pictures)
+    charts, drawings = figures(result)
+    return Section(f'{result.case.name}: {result.case.about}', text=tuple(verdict(result)),
+                   tables=(parameter_table(result),), charts=charts,
+                   drawings=drawings)
 
 
 def text(result: CaseResult) -> str:
@@ -162,7 +193,7 @@ def text(result: CaseResult) -> str:
 
 def as_text(content: Table) -> str:
     """Return a table in fixed width, the first column to the left."""
-    rows = [tuple(content.head), *map(tuple, content.rows)]
+    rows = [tuple(map(str, row)) for row in (content.head, *content.rows)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return '\n'.join('  '.join(
         cell.ljust(width) if k == 0 else cell.rjust(width)

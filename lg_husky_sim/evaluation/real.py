@@ -23,10 +23,11 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.estimate import estimate
 from lg_husky_sim.identification.noise import scales
 from lg_husky_sim.identification.options import with_effects
-from lg_husky_sim.identification.pages import Table
 from lg_husky_sim.identification.problem import Observations, observations, UNITS
 from lg_husky_sim.identification.result import FitResult
 from lg_husky_sim.recording import Recording, segments
+from lg_husky_sim.reporting.sections import Table
+from lg_husky_sim.reporting.words import quantity
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
@@ -174,7 +175,8 @@ def steps_table(result: StepsResult) -> Table:
     """Return the held-out errors of all models, one row a channel."""
     rows = []
     for place, name in enumerate(result.channels):
-        rows.append((f'{name} [{UNITS[_channel(name)]}]',
+        words = name.replace(_channel(name), quantity(_channel(name)))
+        rows.append((f'{words} [{UNITS[_channel(name)]}]',
                      *(f'{result.errors[label][place]:.3f}' for label in LABELS),
                      f'{result.counts[place]} ({result.left_out[place]})'))
     return Table((f'{result.recording}: held-out RMS', *LABELS, 'values (jumps left out)'), rows)

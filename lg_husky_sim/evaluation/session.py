@@ -4,15 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 import json
 from pathlib import Path
 from typing import Any
 
+from lg_husky_sim.comparison.traces import recording_tables, traces_of
 from lg_husky_sim.evaluation import case_report
 from lg_husky_sim.evaluation.cases import Case, engine_case, recorded_case, synthetic_case
-from lg_husky_sim.evaluation.paper_case import evaluate_case
+from lg_husky_sim.evaluation.paper_case import CaseResult, evaluate_case
 from lg_husky_sim.evaluation.real import (
     evaluate_steps,
     LABELS,
@@ -22,8 +23,11 @@ from lg_husky_sim.evaluation.real import (
 )
 from lg_husky_sim.folders import result_folder
 from lg_husky_sim.husky.model_file import ModelFile, save_model
-from lg_husky_sim.identification.pages import page, Section
 from lg_husky_sim.recording import named_apart, read_recording, TopicMap
+from lg_husky_sim.reporting.data import Headline, Provenance, ReportData
+from lg_husky_sim.reporting.sections import Section
+from lg_husky_sim.reporting.words import SIGN
+from lg_husky_sim.reporting.write import write_report
 
 MARKER = 'evaluation.json'
 SCHEMA = 'lg_husky_sim/evaluation/1'
@@ -66,7 +70,8 @@ def _cases(request: Request) -> list[Case]:
     return made
 
 
-def run_evaluation(request: Request, out: Path, tell: Callable[[str], None]) -> str:
+def run_evaluation(request: Request, out: Path, tell: Callable[[str], None],
+                   provenance: Provenance | None = None) -> str:
     """
     Evaluate and write the folder, whole or not at all.
 
@@ -77,6 +82,7 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None]) -> 
         Gets index.html, evaluation.json, evaluation.txt, the pictures and the fitted models.
     tell : callable
         Called with a word after each unit of work.
+    provenance : Provenance, optional
 
     Returns
     -------
@@ -88,35 +94,64 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None]) -> 
                              tell) for case in _cases(request)]
     steps = [evaluate_steps(recording, request.model, request.seed, request.starts, request.jobs,
                             tell=tell) for recording in read]
-    texts, sections = [], []
+    texts = [*map(case_report.text, results), *map(steps_text, steps)]
+    text = '\n\n\n'.join(texts)
     data: dict[str, Any] = {'schema': SCHEMA, 'seed': request.seed,
                             'cases': [case_report.data(result) for result in results],
                             'steps': [steps_data(result) for result in steps]}
     with result_folder(out, MARKER) as folder:
         for result in results:
-            pictures = case_report.figures(result)
-            for one in pictures:
-                (folder / f'{one.name}.png').write_bytes(one.png)
             for kind, fit in zip(('ga', 'least_squares', 'base'), result.fits.values(),
                                  strict=True):
                 save_model(fit.model, folder / f'{result.case.name}_{kind}.yaml')
-            texts.append(case_report.text(result))
-            sections.append(case_report.section(result, pictures))
         for result_of_steps in steps:
             name = result_of_steps.recording.strip('/').replace('/', '_')
             save_model(result_of_steps.extended.model, folder / f'{name}.yaml')
-            texts.append(steps_text(result_of_steps))
-            sections.append(_steps_section(result_of_steps))
-        text = '\n\n\n'.join(texts)
         (folder / 'evaluation.txt').write_text(text + '\n', encoding='utf-8')
         (folder / MARKER).write_text(json.dumps(data, indent=1, ensure_ascii=False,
                                                 allow_nan=False) + '\n',
                                      encoding='utf-8')
-        (folder / 'index.html').write_text(page(
-            "The paper's evaluation, redone",
-            [f'Seed {request.seed}. Errors are measured minus simulated; x is ahead and y to '
-             'the left of the robot as it stood at the start.'], sections), encoding='utf-8')
+        write_report(report_data(request, results, steps, provenance), folder, 'index.html',
+                     pictured=0)
     return text
+
+
+def report_data(request: Request, results: Sequence[CaseResult], steps: Sequence[StepsResult],
+                made_of: Provenance | None = None) -> ReportData:
+    """
+    Return an evaluation as the values of a report.
+
+    Parameters
+    ----------
+    request : Request
+    results : sequence of CaseResult
+    steps : sequence of StepsResult
+    made_of : Provenance, optional
+
+    Returns
+    -------
+    ReportData
+    """
+    columns = tuple(dict.fromkeys(label for result in results for label in result.labels))
+    said = [line for result in results for line in case_report.verdict(result)[:1]]
+    closest = [f'{result.case.name}: {name}' for result in results
+               if (name := case_report.closest(result))]
+    facts = (('Cases', ', '.join(result.case.name for result in results) or 'none'),
+             ('Recordings of steps', str(len(steps))), ('Seed', str(request.seed)))
+    return ReportData(
+        "The paper's evaluation, redone",
+        Headline('Closest on held-out drives: ' + '; '.join(closest) if closest
+                 else "The paper's evaluation, redone", facts=facts, sentences=tuple(said)),
+        columns, traces=tuple(trace for result in results for trace in traces_of(
+            case_report.parts_of(result), columns)),
+        errors=(*map(case_report.papers_numbers, results), *(
+            replace(table, folded=True) for result in results for table in recording_tables(
+                case_report.parts_of(result), result.labels))),
+        sections=(*map(case_report.section, results), *map(_steps_section, steps)),
+        notes=(f'Errors are {SIGN}; x is ahead and y to the left of the robot as it stood at the '
+               'start.',),
+        files=((MARKER, 'has all numbers'), ('evaluation.txt', 'has the tables')),
+        provenance=made_of or Provenance())
 
 
 def steps_text(result: StepsResult) -> str:
@@ -127,5 +162,5 @@ def steps_text(result: StepsResult) -> str:
 
 def _steps_section(result: StepsResult) -> Section:
     return Section(f'{result.recording}: {result.steps} steps, every other one fitted',
-                   points=result.extended.undetermined, tables=[steps_table(result)],
+                   points=tuple(result.extended.undetermined), tables=(steps_table(result),),
                    verbatim=str(result.extended))

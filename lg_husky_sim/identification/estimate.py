@@ -43,6 +43,7 @@ from lg_husky_sim.identification.unknowns import (
     unknowns_of,
 )
 from lg_husky_sim.recording import Segment
+from lg_husky_sim.reporting.words import quantity
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -262,8 +263,9 @@ def _left_over(problem: Problem, solution: Solution) -> list[str]:
     data = problem.observations
     scaled = (data.measured - solution.predicted) * problem.metric.scale
     names = [name for name in data.channels if lingers(data, scaled, name)]
-    return [f'what is left in {", ".join(names)} lingers, as noise does not: physics is left out, '
-            'and the intervals hold for this model alone; lg_husky diagnose looks for it'
+    return [f'the residual of {", ".join(map(quantity, names))} is autocorrelated, as noise is '
+            'not: physics is missing from the model, and the intervals hold for this model '
+            'only; lg_husky diagnose looks for it'
             ] if names else []
 
 

@@ -4,37 +4,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 import json
+import math
+import os
 from pathlib import Path
+import tempfile
 
-from lg_husky_sim.comparison.figures import line_styles, responses_figure, trajectory_figure
-from lg_husky_sim.comparison.metrics import tracking
 from lg_husky_sim.comparison.replay import replay
+from lg_husky_sim.comparison.traces import error_table, Predicted, traces_of
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile, save_model
-from lg_husky_sim.identification.pages import (
-    files_together,
-    page,
-    Picture,
-    picture,
-    Section,
-    Table,
-)
-from lg_husky_sim.identification.pictures import (
-    certainty_figure,
-    convergence_figure,
-    profile_figure,
-)
-from lg_husky_sim.identification.result import FitResult
+from lg_husky_sim.identification.profile import LEVEL, Profile
+from lg_husky_sim.identification.result import Estimated, FitResult
 from lg_husky_sim.identification.start_states import HEAD, summary
 from lg_husky_sim.recording import Segment
-
-#: Longest time that one picture shows [s].
-LONGEST = 60.0
-#: Segments with pictures.
-SHOWN = 3
+from lg_husky_sim.reporting.data import (
+    BEFORE,
+    ErrorRow,
+    ErrorTable,
+    FITTED,
+    Headline,
+    ParameterRow,
+    Provenance,
+    ReportData,
+)
+from lg_husky_sim.reporting.page import page
+from lg_husky_sim.reporting.sections import Cell, Chart, Line, Section, Table, Tone
+from lg_husky_sim.reporting.words import number, plural, quantity_with_unit, SIGN
+from lg_husky_sim.reporting.write import drawn, view_of
+from lg_husky_sim.signals import FloatArray
+import numpy as np
 
 
 def report_paths(out: Path) -> tuple[Path, ...]:
@@ -60,8 +62,32 @@ def report_paths(out: Path) -> tuple[Path, ...]:
     return paths
 
 
-def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile, out: Path
-              ) -> tuple[Path, ...]:
+@contextmanager
+def files_together(paths: Sequence[Path]) -> Iterator[Mapping[Path, Path]]:
+    """
+    Write several files, all or none.
+
+    Parameters
+    ----------
+    paths : sequence of pathlib.Path
+        In one folder, which is made.
+
+    Yields
+    ------
+    mapping of pathlib.Path to pathlib.Path
+        Where to write each; they are moved into place when the block ends without an exception.
+    """
+    folder = paths[0].parent
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix='.lg_husky.', dir=folder) as scratch:
+        places = {path: Path(scratch) / path.name for path in paths}
+        yield places
+        for path, place in places.items():
+            os.replace(place, path)
+
+
+def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile, out: Path,
+              provenance: Provenance | None = None) -> tuple[Path, ...]:
     """
     Write a fit, all files or none.
 
@@ -74,11 +100,12 @@ def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile,
         The model to show beside the fitted one.
     out : pathlib.Path
         Model file; the report's files stand beside it.
+    provenance : Provenance, optional
 
     Returns
     -------
     tuple of pathlib.Path
-        Model, text, JSON, HTML.
+        Model, text, JSON, HTML. A picture that cannot be drawn is a note on the page.
 
     Raises
     ------
@@ -86,7 +113,6 @@ def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile,
         If a name cannot be used.
     """
     paths = report_paths(out)
-    pictures = fit_pictures(result, segments, before)
     with files_together(paths) as places:
         model, text, data, html = (places[path] for path in paths)
         save_model(result.model, model)
@@ -94,76 +120,143 @@ def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile,
         data.write_text(json.dumps(result.data(), indent=1, ensure_ascii=False,
                                    allow_nan=False) + '\n',
                         encoding='utf-8')
-        html.write_text(page('Model fitted to recordings', _intro(result),
-                             _sections(result, pictures)), encoding='utf-8')
+        report = report_data(result, segments, before, provenance)
+        images, captions, failures = drawn(report)
+        html.write_text(page(report, view_of(report), images, captions, failures),
+                        encoding='utf-8', errors='replace')
     return paths
 
 
-def fit_pictures(result: FitResult, segments: Sequence[Segment], before: ModelFile
-                 ) -> list[Picture]:
+def report_data(result: FitResult, segments: Sequence[Segment], before: ModelFile,
+                provenance: Provenance | None = None) -> ReportData:
     """
-    Draw the longest segments before and after, the certainty and the convergence.
+    Return a fit as the values of a report.
 
     Parameters
     ----------
     result : FitResult
     segments : sequence of Segment
+        That were fitted.
     before : ModelFile
+    provenance : Provenance, optional
 
     Returns
     -------
-    list of Picture
+    ReportData
     """
+    columns = (BEFORE, FITTED)
     plants = {label: compile_model(model.structure).at(model.parameters)
-              for label, model in (('before', before), ('fitted', result.model))}
-    styles = line_styles(('fitted', 'before'), rivals=('before',))
-    made = []
-    ranked = sorted(range(len(segments)), key=lambda k: (-segments[k].duration, k))[:SHOWN]
-    for index in sorted(ranked):
-        segment = segments[index]
-        title = f'{segment.recording}, segment {segment.index}'
-        series = {label: replay(plant, segment) for label, plant in plants.items()}
-        made.append(picture(responses_figure(segment, series, styles, title, LONGEST),
-                            f'{title}: measured and simulated responses'))
-        if 'pose' in segment.streams:
-            tracks = {label: tracking(segment, one) for label, one in series.items()}
-            made.append(picture(trajectory_figure(segment, tracks, styles, title, LONGEST),
-                                f'{title}: trajectory and tracking error'))
-    made.append(picture(certainty_figure(result),
-                        'Intervals of the estimates and their correlation'))
-    if result.profiles:
-        made.append(picture(profile_figure(result.profiles), 'Likelihood profiles'))
-    if len(result.history):
-        made.append(picture(convergence_figure(result.history),
-                            "Convergence of the search (the paper's Fig. 12)"))
-    return made
+              for label, model in ((BEFORE, before), (FITTED, result.model))}
+    parts: list[Predicted] = [
+        (segment, {label: replay(plant, segment) for label, plant in plants.items()})
+        for segment in segments]
+    residuals = ErrorTable('What was fitted', tuple(
+        ErrorRow(quantity_with_unit(one.name), {BEFORE: one.before, FITTED: one.after})
+        for one in result.channels), columns, compared=columns, note=(
+            'Root mean squares of what the fit minimises: the pose is set back to the measured '
+            'one every few seconds.'))
+    replayed = error_table('Driven by the commands alone', parts, columns, compared=columns)
+    sections = [*_certainty(result), Section('As text', verbatim=str(result), folded=True)]
+    return ReportData(
+        f'Model fitted to {", ".join(result.recordings)}', _headline(result, replayed), columns,
+        ((BEFORE, 'the model as it was given'), (FITTED, 'with the estimates below')),
+        traces_of(parts, columns), (replayed, residuals), sections=tuple(sections),
+        parameters=tuple(_parameter(one, result.model) for one in result.estimates),
+        parameters_first=True,
+        notes=(f'Errors are {SIGN}; x is ahead and y to the left of the robot as it stood at the '
+               'start of the recording.', *result.undetermined),
+        provenance=provenance or Provenance())
 
 
-def _intro(result: FitResult) -> list[str]:
-    state = 'converged' if result.converged else 'not converged'
-    return [f'{", ".join(result.recordings)}. Method {result.method.value}, seed {result.seed}, '
-            f'{result.evaluations} simulations in {result.seconds:.2f} s, {state}.']
+def _headline(result: FitResult, table: ErrorTable) -> Headline:
+    bound = sum(1 for one in result.estimates if _parameter(one, result.model).at_bound)
+    worse = [row.name for row in table.rows
+             if row.values.get(FITTED, math.nan) > 1.05 * row.values.get(BEFORE, math.nan)]
+    warnings = list(result.warnings)
+    if worse:
+        warnings.append('Driven by the commands alone, the fitted model predicts worse than the '
+                        f'one before: {", ".join(name.split(" [")[0] for name in worse)}.')
+    count = plural(len(result.estimates), 'parameter')
+    if not result.converged:
+        return Headline(f'Not converged: {count} of {plural(len(result.recordings), "recording")}',
+                        Tone.BAD, _facts(result, bound), (), tuple(warnings))
+    return Headline(f'{count} estimated from {plural(len(result.recordings), "recording")}',
+                    Tone.BAD if bound else Tone.GOOD, _facts(result, bound),
+                    ('Load the model with `ros2 run lg_husky_sim sim_node --ros-args -p '
+                     'model:=FILE.yaml`, or give it to `simulate`, `compare` and `diagnose`.',),
+                    tuple(warnings))
 
 
-def _sections(result: FitResult, pictures: Sequence[Picture]) -> list[Section]:
-    estimates = Table(
-        ('parameter', 'value', '95 % low', '95 % high', 'before', 'unit'),
-        [(one.name, f'{one.value:.5g}', f'{one.low:.5g}', f'{one.high:.5g}',
-          f'{one.start:.5g}', one.unit) for one in result.estimates])
-    channels = Table(
-        ('root mean square of measured − simulated', 'before', 'fitted', 'unit', 'values'),
-        [(c.name, f'{c.before:.4g}', f'{c.after:.4g}', c.unit, str(c.count))
-         for c in result.channels])
-    tables = [estimates]
+def _facts(result: FitResult, bound: int) -> tuple[tuple[str, str], ...]:
+    return (('Method', f'{result.method.value}, seed {result.seed}'),
+            ('Simulations', f'{result.evaluations} in {result.seconds:.1f} s'),
+            ('Converged', 'yes' if result.converged else 'no'),
+            ('At their bounds', str(bound)))
+
+
+def _parameter(one: Estimated, model: ModelFile) -> ParameterRow:
+    least = most = math.nan
+    if not one.nuisance and one.name in model.parameters:
+        entry = model.parameters.entry(one.name)
+        least, most = entry.lower, entry.upper
+    span = most - least
+    edge = math.isfinite(span) and min(one.value - least, most - one.value) <= 1e-6 * span
+    # Bounds of physics, decades away, say nothing about where an estimate lies.
+    far = not math.isfinite(span) or span > 20.0 * max(one.high - one.low, abs(one.value), 1e-300)
+    return ParameterRow(one.name, one.unit, one.start, one.value, one.low, one.high,
+                        math.nan if far else least, math.nan if far else most, edge)
+
+
+def _certainty(result: FitResult) -> list[Section]:
+    names = [one.name.replace('_', ' ') for one in result.estimates]
+    tables = []
+    if len(names) > 1:
+        tables.append(Table(('correlation', *names), tuple(
+            (name, *(Cell(f'{value:+.2f}'.replace('-', '−'), abs(float(value)))
+                     for value in row[:place]), *('' for _ in row[place:]))
+            for place, (name, row) in enumerate(zip(names, result.correlation, strict=True)))))
+    sections = []
+    if tables:
+        sections.append(Section('Correlation of the estimates', tables=tuple(tables), folded=True))
     if result.start_states:
-        tables.append(Table(HEAD, summary(result.start_states)))
-    # Those of the parameters come last: certainty, then profiles and convergence if there are.
-    last = len(pictures) - 1 - bool(result.profiles) - bool(len(result.history))
-    sections = [Section('Agreement', tables=[channels], pictures=pictures[:last])]
-    if result.warnings:
-        sections.append(Section('Warnings', points=result.warnings, warning=True))
-    sections.append(Section(
-        'Parameters', tables=tables, points=result.undetermined,
-        pictures=pictures[last:]))
-    sections.append(Section('As text', verbatim=str(result)))
+        sections.append(Section('States at the start of the segments', tables=(
+            Table(HEAD, summary(result.start_states)),)))
+    charts = [profile_chart(one) for one in result.profiles]
+    if charts:
+        sections.append(Section('Likelihood profiles', charts=tuple(charts)))
+    if len(result.history):
+        sections.append(Section('Convergence of the search', charts=(
+            convergence_chart(result.history),)))
     return sections
+
+
+def profile_chart(one: Profile) -> Chart:
+    """Return a likelihood profile with its 95 % level as a chart."""
+    level = np.full(one.values.size, LEVEL)
+    return Chart(f'profile_{one.name}', f'Rise of the cost as {one.name.replace("_", " ")} is '
+                 f'held; 95 % interval {number(one.low, 4)} to {number(one.high, 4)}',
+                 (Line('profile', one.values, one.rise), Line('95 %', one.values, level)),
+                 one.name.replace('_', ' '), 'rise of the cost [nats]')
+
+
+def convergence_chart(history: FloatArray, name: str = 'convergence') -> Chart:
+    """
+    Return the paper's Fig. 12: best and mean cost of each generation.
+
+    Parameters
+    ----------
+    history : numpy.ndarray, shape (n_generations + 1, 2)
+        Best and mean cost [m].
+    name : str
+
+    Returns
+    -------
+    Chart
+    """
+    generations = np.arange(len(history), dtype=np.float64)
+    best, mean = (number(float(value), 4) for value in history[-1])
+    return Chart(name, f"Convergence of the search (the paper's Fig. 12): best {best} m, "
+                 f'mean {mean} m',
+                 (Line('best', generations, history[:, 0]),
+                  Line('mean of the population', generations, history[:, 1], dots=True)),
+                 'generation', 'objective of eq. (23) [m]', logarithmic=True)

@@ -22,6 +22,8 @@ from lg_husky_sim.recording import (
     segments,
     TopicMap,
 )
+from lg_husky_sim.reporting.data import Provenance
+from lg_husky_sim.reporting.provenance import provenance
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,11 @@ def fit_together(request: Request, paths: Sequence[str], out: Path, jobs: int = 
     """
     parts = read_segments(request, paths)
     result = _fit(request, parts, jobs, scheduler, tell)
-    return result, write_fit(result, parts, request.before, out)
+    return result, write_fit(result, parts, request.before, out, _made_of(paths))
+
+
+def _made_of(paths: Sequence[str]) -> Provenance:
+    return provenance([(Path(path).name, path) for path in paths])
 
 
 @dataclass(frozen=True)
@@ -150,7 +156,8 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
     results = run_tasks(_fit_one, [_Task(request, path) for path in paths], jobs, scheduler,
                         lambda: word('recording'))
     for name, path, result in zip(names, paths, results, strict=True):
-        write_fit(result, read_segments(request, [path]), request.before, out / f'{name}.yaml')
+        write_fit(result, read_segments(request, [path]), request.before, out / f'{name}.yaml',
+                  _made_of([path]))
     return each_table(names, results), results
 
 

@@ -23,6 +23,8 @@ MEASURED = 'measured'
 NOMINAL = 'nominal'
 RECALIBRATED = 'recalibrated'
 WITH_FINDING = 'with finding'
+BEFORE = 'before'
+FITTED = 'fitted'
 
 
 def _frozen(values: FloatArray) -> FloatArray:
@@ -286,6 +288,8 @@ class ReportData:
     mismatches : tuple of Mismatch
         Strongest first.
     parameters : tuple of ParameterRow
+    parameters_first : bool
+        Whether the parameters are the answer and stand before the signals.
     sections : tuple of Section
         Further ones, in their order.
     notes : tuple of str
@@ -304,6 +308,7 @@ class ReportData:
     view: View | None = None
     mismatches: tuple[Mismatch, ...] = ()
     parameters: tuple[ParameterRow, ...] = ()
+    parameters_first: bool = False
     sections: tuple[Section, ...] = ()
     notes: tuple[str, ...] = ()
     files: tuple[tuple[str, str], ...] = ()

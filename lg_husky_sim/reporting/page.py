@@ -12,6 +12,7 @@ from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.reporting.data import (
     ErrorTable,
+    MEASURED,
     Mismatch,
     ParameterRow,
     RECALIBRATED,
@@ -24,6 +25,7 @@ from lg_husky_sim.reporting.words import (
     capitalised,
     change,
     number,
+    padded,
     quantity,
     quantity_with_unit,
     SIGN,
@@ -82,8 +84,8 @@ def error_cells(table: ErrorTable) -> Table:
         for name in table.columns:
             value = known.get(name, math.nan)
             best = table.compared is None and len(known) > 1 and value == least
-            cells.append(Cell(number(value), value / most if most > 0.0 and name in known else 0.0,
-                              Tone.GOOD if best else Tone.PLAIN))
+            share = value / most if most > 0.0 and len(known) > 1 and name in known else 0.0
+            cells.append(Cell(padded(value), share, Tone.GOOD if best else Tone.PLAIN))
         if table.compared:
             cells.append(_change_cell(known, table.compared, row.low, row.high))
         rows.append(cells)
@@ -148,6 +150,13 @@ def jumps_of(data: ReportData) -> dict[int, int]:
     return dict(enumerate(able))
 
 
+def view_caption(data: ReportData, view: View) -> str:
+    """Return what the first picture of a page shows."""
+    words = ', '.join((MEASURED, *data.columns))
+    return (f'{capitalised(quantity(view.channel))} of {view.recording}: {words}; below it the '
+            f'errors, {SIGN}.')
+
+
 def page(data: ReportData, view: View | None, images: Mapping[str, bytes],
          captions: Mapping[str, str], notes: Sequence[str] = ()) -> str:
     """
@@ -184,7 +193,8 @@ def page(data: ReportData, view: View | None, images: Mapping[str, bytes],
     heading = '' if view is None else (
         f'{capitalised(quantity_with_unit(view.channel))}: measured and predicted')
     return environment.get_template('report.html.j2').render(
-        data=data, view=None if view is None else {'heading': heading}, sign=SIGN,
+        data=data, sign=SIGN, view=None if view is None else {
+            'heading': heading, 'caption': view_caption(data, view)},
         css=Markup((own / 'report.css').read_text('utf-8')),  # noqa: S704, our own file
         script=Markup((own / 'report.js').read_text('utf-8')),  # noqa: S704, our own file
         library=Markup(library),  # noqa: S704, base64

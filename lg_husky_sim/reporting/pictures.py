@@ -18,7 +18,13 @@ from lg_husky_sim.reporting.styles import (
     PALETTE,
     PICTURE,
 )
-from lg_husky_sim.reporting.words import capitalised, quantity, quantity_with_unit, SIGN
+from lg_husky_sim.reporting.words import (
+    capitalised,
+    quantity,
+    quantity_with_unit,
+    SIGN,
+    with_unit,
+)
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -73,8 +79,8 @@ def _limit(axes: Axes, lines: Sequence[FloatArray]) -> None:
                   min(high + 2.0 * room, values.max() + 0.5 * room))
 
 
-def draw_signal(axes: Axes, trace: Trace, styles: Mapping[str, LineStyle], start: float,
-                end: float, *, errors: bool = False) -> None:
+def draw_signal(axes: Axes, trace: Trace, styles: Mapping[str, LineStyle],
+                start: float = -math.inf, end: float = math.inf, *, errors: bool = False) -> None:
     """
     Draw a quantity over time, measured and predicted, or the errors of the predictions.
 
@@ -110,7 +116,7 @@ def draw_signal(axes: Axes, trace: Trace, styles: Mapping[str, LineStyle], start
     axes.set_ylabel(f'{SIGN}\n[{trace.unit}]' if errors else f'[{trace.unit}]')
     if not errors:
         axes.set_title(capitalised(name))
-    axes.set_xlim(start, end)
+    axes.set_xlim(max(start, float(trace.times[0])), min(end, float(trace.times[-1])))
     _limit(axes, lines)
 
 
@@ -225,23 +231,11 @@ def path_picture(data: ReportData, recording: str, longest: float = LONGEST,
     assert y is not None
     styles = column_styles(data.columns)
     start, last = float(x.times.min()), float(x.times.max())
-    shown = x.times <= start + longest
     with rc_context(PICTURE):
         figure = Figure(figsize=(9.0, 4.8), layout='constrained')
         grid = figure.add_gridspec(2, 2)
         left = figure.add_subplot(grid[:, 0])
-        left.plot(x.measured[shown], y.measured[shown], color=MEASURED_COLOUR, linewidth=2.6,
-                  alpha=0.6, label=MEASURED)
-        for column, style in styles.items():
-            if column in x.predicted and column in y.predicted:
-                left.plot(x.predicted[column][shown], y.predicted[column][shown], label=column,
-                          **style.drawn)
-        first = int(np.argmax(np.isfinite(x.measured)))
-        left.plot(x.measured[first], y.measured[first], marker='>', color='black', markersize=6,
-                  linestyle='none', zorder=5)
-        left.set_aspect('equal', adjustable='datalim')
-        left.set_xlabel('x [m]')
-        left.set_ylabel('y [m]')
+        draw_path(left, x, y, styles, start + longest)
         left.set_title(_entitled('(a) Path', start, min(last, start + longest), last))
         upper = figure.add_subplot(grid[0, 1])
         lower = figure.add_subplot(grid[1, 1], sharex=upper)
@@ -252,6 +246,36 @@ def path_picture(data: ReportData, recording: str, longest: float = LONGEST,
         lower.set_xlabel('time [s]')
         _legend_above(figure, [left], title or recording)
     return figure
+
+
+def draw_path(axes: Axes, x: Trace, y: Trace, styles: Mapping[str, LineStyle],
+              end: float = math.inf) -> None:
+    """
+    Draw the path that was driven and those that were predicted, to one scale.
+
+    Parameters
+    ----------
+    axes : matplotlib Axes
+    x, y : Trace
+        Of one recording, at the same times.
+    styles : mapping of str to LineStyle
+        By column, in the order of drawing.
+    end : float
+        Last time that is drawn [s].
+    """
+    shown = x.times <= end
+    axes.plot(x.measured[shown], y.measured[shown], color=MEASURED_COLOUR, linewidth=2.6,
+              alpha=0.6, label=MEASURED)
+    for column, style in styles.items():
+        if column in x.predicted and column in y.predicted:
+            axes.plot(x.predicted[column][shown], y.predicted[column][shown], label=column,
+                      **style.drawn)
+    first = int(np.argmax(np.isfinite(x.measured)))
+    axes.plot(x.measured[first], y.measured[first], marker='>', color='black', markersize=6,
+              linestyle='none', zorder=5)
+    axes.set_aspect('equal', adjustable='datalim')
+    axes.set_xlabel('x [m]')
+    axes.set_ylabel('y [m]')
 
 
 def _draw_tracking(axes: Axes, trace: Trace, styles: Mapping[str, LineStyle]) -> None:
@@ -265,6 +289,29 @@ def _draw_tracking(axes: Axes, trace: Trace, styles: Mapping[str, LineStyle]) ->
     axes.set_ylabel(f'{trace.channel} error [m]')
     axes.margins(x=0.01)
     axes.legend(loc='best', frameon=True, framealpha=0.8, edgecolor='none')
+
+
+def draw_intervals(axes: Axes, numbers: Sequence[tuple[str, str, float, float, float]]) -> None:
+    """
+    Draw 95 % intervals relative to their estimates.
+
+    Parameters
+    ----------
+    axes : matplotlib Axes
+    numbers : sequence of (str, str, float, float, float)
+        Name, unit, estimate, low and high of each.
+    """
+    for row, (_, _, value, low, high) in enumerate(numbers):
+        scale = max(abs(value), 1e-12)
+        axes.plot([100.0 * (low - value) / scale, 100.0 * (high - value) / scale], [row, row],
+                  color=PALETTE[0][0], linewidth=3.0)
+        axes.plot(0.0, row, 'o', color=PALETTE[0][0], markersize=6)
+    axes.axvline(0.0, color='#333333', linewidth=0.8)
+    axes.set_yticks(range(len(numbers)), [
+        f'{name.replace("_", " ")} = {with_unit(value, unit, 4)}'
+        for name, unit, value, _, _ in numbers])
+    axes.invert_yaxis()
+    axes.set_xlabel('95 % interval about the estimate [%]')
 
 
 def chart_picture(chart: Chart) -> Figure:

@@ -16,6 +16,8 @@ from lg_husky_sim.reporting.data import Provenance
 
 #: Read at once while hashing [bytes].
 _BLOCK = 1 << 20
+#: What the command line is started as: the script, or the module with ``python -m``.
+PROGRAM = ('lg_husky', 'main.py')
 
 
 def content_hash(path: str | os.PathLike[str]) -> str:
@@ -55,8 +57,9 @@ def package_version() -> str:
 
 
 def given_command() -> str:
-    """Return the command line of this process as it would be typed again."""
-    return shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    """Return the command line of this process as it was typed; empty if it is another program."""
+    own = Path(sys.argv[0]).name in PROGRAM
+    return shlex.join(['lg_husky', *sys.argv[1:]]) if own else ''
 
 
 def provenance(recordings: Iterable[tuple[str, str | os.PathLike[str]]],
@@ -70,13 +73,13 @@ def provenance(recordings: Iterable[tuple[str, str | os.PathLike[str]]],
     recordings, models : iterable of (str, str)
         Name and path of each.
     command : str
-        As it was typed.
+        That of this process if not given.
 
     Returns
     -------
     Provenance
     """
-    return Provenance(package_version(), command, tuple(
+    return Provenance(package_version(), command or given_command(), tuple(
         (kind, name, content_hash(path))
         for kind, group in (('recording', recordings), ('model', models))
         for name, path in group if path))

@@ -47,7 +47,7 @@
   const axis = (more) => ({ gridcolor: colour('--plot-grid'), zeroline: false,
     linecolor: colour('--line'), ticks: 'outside', tickcolor: colour('--line'),
     nticks: narrow() ? 5 : 8, ...more });
-  const config = { responsive: true, displaylogo: false, displayModeBar: !coarse && !narrow(),
+  const config = { responsive: true, displaylogo: false, displayModeBar: coarse || narrow() ? false : 'hover',
     modeBarButtonsToRemove: ['lasso2d', 'select2d', 'autoScale2d'] };
 
   // Signals one below the other on one time axis; panels are [trace, whether errors].
@@ -147,12 +147,12 @@
         colorscale: [[0, dark.matches ? '#4a90c2' : '#9cc4e4'], [0.5, '#e69f00'],
           [1, dark.matches ? '#ff5a4d' : '#b3001b']],
         showscale: Boolean(error), colorbar: { title: { text: 'error [m]', side: 'top' },
-          orientation: 'h', thickness: 10, y: -50 / (layout.height - 120), yanchor: 'top',
+          orientation: 'h', thickness: 10, y: -62 / (layout.height - 132), yanchor: 'top',
           len: 0.7 } } });
     const first = x.m.findIndex(Number.isFinite);
     lines.push({ x: [x.m[first]], y: [y.m[first]], type: 'scatter', mode: 'markers', name: 'start',
       marker: { symbol: 'triangle-right', size: 12, color: colour('--ink') }, hoverinfo: 'skip' });
-    layout.margin.b = 112;
+    layout.margin.b = 124;
     Plotly.react(place, lines, layout, config).then(() => {
       place.removeAllListeners('plotly_click');
       place.on('plotly_click', (event) => {

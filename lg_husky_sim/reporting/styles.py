@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from lg_husky_sim.reporting.data import NOMINAL, RECALIBRATED, WITH_FINDING
+from lg_husky_sim.reporting.data import BEFORE, FITTED, NOMINAL, RECALIBRATED, WITH_FINDING
 
 PALETTE = (('#0072b2', '#58b4ff'), ('#d55e00', '#ff9457'), ('#009e73', '#4fd1ab'),
-           ('#b5558f', '#e79ac8'), ('#2a8fc7', '#8fd0f7'), ('#b97f00', '#f0bb4d'))
+           ('#b5558f', '#e79ac8'), ('#6a4fc3', '#b9a8fa'), ('#b97f00', '#f0bb4d'))
 """Colours on white and on black that are told apart by all readers (after Okabe and Ito)."""
 MEASURED_COLOUR = '#7b8493'
 _DASHES = {'solid': '-', 'dot': ':', 'dash': '--'}
@@ -54,8 +54,9 @@ class LineStyle:
         return {'color': self.light, 'linestyle': _DASHES[self.dash], 'linewidth': self.width}
 
 
-_FIXED = {NOMINAL: LineStyle(*PALETTE[3], 'dot'), RECALIBRATED: LineStyle(*PALETTE[1]),
-          WITH_FINDING: LineStyle(*PALETTE[0])}
+_GIVEN = LineStyle(*PALETTE[3], 'dot')
+_FIXED = {NOMINAL: _GIVEN, BEFORE: _GIVEN, RECALIBRATED: LineStyle(*PALETTE[1]),
+          FITTED: LineStyle(*PALETTE[1]), WITH_FINDING: LineStyle(*PALETTE[0])}
 
 
 def column_styles(columns: Sequence[str]) -> dict[str, LineStyle]:
@@ -69,7 +70,8 @@ def column_styles(columns: Sequence[str]) -> dict[str, LineStyle]:
     Returns
     -------
     dict of str to LineStyle
-        The three columns of a diagnosis always look the same; others take the palette in order.
+        The columns of a diagnosis and of a fit always look the same; others take the palette in
+        order.
     """
     return {name: _FIXED.get(name, LineStyle(*PALETTE[place % len(PALETTE)],
                                              'dash' if place >= len(PALETTE) else 'solid'))

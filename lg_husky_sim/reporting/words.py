@@ -81,6 +81,14 @@ def number(value: float, digits: int = 3) -> str:
     return text.replace('-', '−')
 
 
+def padded(value: float, digits: int = 3) -> str:
+    """Return a number in so many significant digits, zeros at its end among them."""
+    text = number(value, digits)
+    if text == UNKNOWN or 'e' in text or abs(value) >= 10 ** digits:
+        return text
+    return f'{value:#.{digits}g}'.rstrip('.').replace('-', '−')
+
+
 def with_unit(value: float, unit: str, digits: int = 3) -> str:
     """Return a number with its unit; the unit 1 is not written."""
     return f'{number(value, digits)} {unit}' if unit not in ('', '1') else number(value, digits)
@@ -90,5 +98,5 @@ def change(before: float, after: float) -> str:
     """Return a change in per cent with its sign; a dash where there is none."""
     if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
         return UNKNOWN
-    share = 100.0 * (after / before - 1.0)
-    return f'×{after / before:.1f}' if share > 999.0 else f'{share:+.0f}\u00a0%'.replace('-', '−')
+    share = round(100.0 * (after / before - 1.0)) + 0.0  # no minus zero
+    return f'×{after / before:.1f}' if share > 999 else f'{share:+.0f}\u00a0%'.replace('-', '−')

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from lg_husky_sim.extras import require
 from lg_husky_sim.reporting.data import RECALIBRATED, ReportData, Trace, View, WITH_FINDING
-from lg_husky_sim.reporting.page import page
+from lg_husky_sim.reporting.page import page, view_caption
 from lg_husky_sim.reporting.payload import of_first_recordings
 from lg_husky_sim.reporting.pictures import (
     chart_picture,
@@ -22,7 +22,7 @@ from lg_husky_sim.reporting.pictures import (
     responses_picture,
 )
 from lg_husky_sim.reporting.thinning import longest_stretch
-from lg_husky_sim.reporting.words import capitalised, plural, quantity, SIGN
+from lg_husky_sim.reporting.words import plural
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -65,7 +65,8 @@ def write_report(data: ReportData, folder: Path, name: str = REPORT, *,
     name : str
         Of the page.
     pictured : int
-        Recordings that get pictures of their signals and path, the first ones.
+        Recordings that get pictures of their signals and path, the first ones; with none, the
+        first picture of the page is not drawn either.
     on_progress : callable, optional
         Called after each picture.
 
@@ -178,11 +179,8 @@ def drawn(data: ReportData, pictured: int = MOST_PICTURED,
 def _jobs(data: ReportData, pictured: int) -> Mapping[str, tuple[str, Callable[[], Figure]]]:
     jobs: dict[str, tuple[str, Callable[[], Figure]]] = {}
     view = view_of(data)
-    if view is not None:
-        words = ', '.join(('measured', *data.columns))
-        jobs['before_after'] = (
-            f'{capitalised(quantity(view.channel))} of {view.recording}: {words}; below it the '
-            f'errors, {SIGN}.', partial(first_picture, data, view))
+    if view is not None and pictured:
+        jobs['before_after'] = (view_caption(data, view), partial(first_picture, data, view))
     for place, name in enumerate(data.recordings[:pictured]):
         stem = f'{place + 1:02d}_{file_stem(name)}'
         jobs[f'{stem}_responses'] = (

@@ -159,8 +159,11 @@ def test_compare_models_and_a_rival(bag: Path, capsys: Any) -> None:
     assert data['models'][1]['parameters']['command_gain'] == 0.95
     assert (out / 'compare.txt').read_text().strip() in printed
     names = {path.name for path in out.iterdir()}
-    assert names == {'compare.json', 'compare.txt', 'index.html', '01_turn_01_responses.png',
-                     '01_turn_01_trajectory.png', '.compare.json.files'}
+    assert names == {'compare.json', 'compare.txt', 'index.html', '01_turn_responses.png',
+                     '01_turn_trajectory.png', 'before_after.png', '.compare.json.files'}
+    page = (out / 'index.html').read_text()
+    assert 'Closest to the recordings: paper' in page
+    assert re.search(r'recording turn</td><td class="words"><code>[0-9a-f]{64}</code>', page)
 
 
 def test_the_page_is_self_contained_and_escaped(bag: Path) -> None:
@@ -170,9 +173,9 @@ def test_the_page_is_self_contained_and_escaped(bag: Path) -> None:
     out = bag.parent / 'result'
     assert run(['compare', str(evil), '--out', str(out), '--horizon', '1.5']) == 0
     page = (out / 'index.html').read_text()
-    assert '<script' not in page
-    assert '&lt;script&gt;' in page
-    assert page.count('src="data:image/png;base64,') == 4  # two windows, two pictures each
+    assert '<script>alert' not in page
+    assert '&lt;script&gt;alert' in page
+    assert page.count('src="data:image/png;base64,') == 3
     assert not re.search(r'(src|href)="(?!data:|#)', page)
 
 

@@ -143,7 +143,8 @@ def test_what_the_base_does_is_found_on_held_out_steps() -> None:
     assert result.extended.values['limit_yaw'] == pytest.approx(0.5, rel=0.05)
     assert rows['wheel_left'][-1] < 0.1
     table = steps_table(result)
-    assert [row[0].split()[0] for row in table.rows][:2] == ['wheel_left', 'wheel_right']
+    assert [row[0] for row in table.rows][:2] == [
+        'left wheel rate [rad/s]', 'right wheel rate [rad/s]']
     assert steps_data(result)['steps'] == 10
 
 

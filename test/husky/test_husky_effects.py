@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 import math
+from string import Formatter
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import catalogue, descriptions, Effect, Onset, OnsetKind
@@ -382,3 +383,14 @@ def test_late_effects_need_an_onset_and_may_not_add_states(robot: Maker) -> None
         robot(Effect('payload', late=True))
     with pytest.raises(ParameterError, match='late effect may not add states'):
         robot(Effect('speed_loop', late=True), onset=Onset(OnsetKind.TIME, 1.0))
+
+
+@pytest.mark.parametrize('name', list(catalogue()))
+def test_every_effect_says_what_to_do_with_its_own_numbers(name: str) -> None:
+    kind = catalogue()[name]
+    assert kind.advice.robot
+    known = {p.name for p in kind.parameters} | {
+        'side', 'where', 'wheels', 'stream', 'amplitude', 'phase'}
+    for sentence in (*kind.advice.robot, *kind.advice.simulator):
+        assert {part[1] for part in Formatter().parse(sentence) if part[1]} <= known
+        assert sentence.count('`') % 2 == 0
