@@ -119,7 +119,8 @@ def choose(spec: Spec, rng: Rng) -> tuple[tuple[str, ...], tuple[str, ...]]:
     elif spec.effects:
         chosen = spec.effects
     elif spec.kind == 'outside':
-        chosen = (str(rng.choice(sorted(catalogue.OUTSIDE))),)
+        outside = set(catalogue.OUTSIDE) - catalogue.absent_from(spec.world)
+        chosen = (str(rng.choice(sorted(outside))),)
     else:
         if spec.kind == 'pair':
             # Pairs hold all along, and ground that is the same all along has not changed.

@@ -26,7 +26,8 @@ OUTSIDE: Mapping[str, str] = {
     'wheel_eccentricity': 'traction', 'wavy_floor': 'translation',
     'reverse_gain': 'electrical', 'motor_cogging': 'drivetrain',
     'wind_gusts': 'translation', 'command_stutter': 'command',
-    'gyro_clipping': 'sensor', 'offset_mass': 'rotation', 'periodic_cutback': 'command',
+    'gyro_clipping': 'sensor', 'com_shift': 'rotation', 'wheel_loop_retuned': 'command',
+    'periodic_cutback': 'command',
 }
 
 SEVERITIES = ('weak', 'medium', 'strong')
@@ -45,7 +46,8 @@ _HIDDEN_BY_LOOP = frozenset({
 # Effects that the rigid-body engine's robot has no part for.
 _WITHOUT_ENGINE = frozenset({
     'speed_loop', 'belt_compliance', 'motor_heating', 'gear_backlash', 'motor_cogging',
-    'wheel_eccentricity'})
+    'wheel_eccentricity', 'wheel_loop_retuned'})
+_WITHOUT_LOOP = frozenset({'wheel_loop_retuned'})
 
 
 def needs(effects: Iterable[str]) -> frozenset[str]:
@@ -57,7 +59,7 @@ def needs(effects: Iterable[str]) -> frozenset[str]:
 
 def absent_from(world: str) -> frozenset[str]:
     """Return the effects that a world cannot hide."""
-    return {'g2': _WITHOUT_ENGINE, 'g4': _WITHOUT_ENGINE, 'g3': _HIDDEN_BY_LOOP}.get(
+    return {'g1': _WITHOUT_LOOP, 'g2': _WITHOUT_ENGINE, 'g4': _WITHOUT_ENGINE, 'g3': _HIDDEN_BY_LOOP}.get(
         world, frozenset())
 
 

@@ -43,9 +43,16 @@ def _gyro_clipping(s: Setting, rng: Rng) -> Change:
     return Change(senses={'gyro_clip': rate}, parameters={'rate': rate})
 
 
-def _offset_mass(s: Setting, rng: Rng) -> Change:
+def _com_shift(s: Setting, rng: Rng) -> Change:
     ahead = s.size * sign(rng)
     return Change({'centre_forward': ahead}, parameters={'centre_forward': ahead})
+
+
+def _wheel_loop_retuned(s: Setting, rng: Rng) -> Change:
+    factor = s.size if rng.random() < 0.5 else 1.0 / s.size
+    return Change({'loop_gain': s.fields['loop_gain'] * factor,
+                   'loop_integral': s.fields['loop_integral'] * factor},
+                  parameters={'gain_factor': factor}, form='both gains')
 
 
 def _periodic_cutback(s: Setting, rng: Rng) -> Change:
@@ -60,6 +67,7 @@ BUILDERS: Mapping[str, Builder] = {
     'wind_gusts': _wind_gusts,
     'command_stutter': _command_stutter,
     'gyro_clipping': _gyro_clipping,
-    'offset_mass': _offset_mass,
+    'com_shift': _com_shift,
+    'wheel_loop_retuned': _wheel_loop_retuned,
     'periodic_cutback': _periodic_cutback,
 }

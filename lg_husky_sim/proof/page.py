@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 import os
 from pathlib import Path
+import textwrap
 from typing import Any
 
 from lg_husky_sim.proof.settings import settings
@@ -27,8 +28,8 @@ any user would call it, with the recordings and what a ruler says of the robot.
 What nobody should rely on is drawn over decades: roughness of the floor, noise, ticks, how wheel
 speeds are made, stamps, jitter, rates, the base's own clock, lost and late messages, missing
 sensors, lengths, the form of each law. Tuning never sees some families of them
-(`left_out_of_tuning` in `config/blind_trial.yaml`): {left_out}. A reported set is used once; its
-seeds are refused afterwards.
+(`left_out_of_tuning` in `config/blind_trial.yaml`). A reported set is used once; its seeds are
+refused afterwards.
 """
 
 
@@ -221,11 +222,12 @@ def page_of(sections: Mapping[str, tuple[Json, Sequence[Json]]], sources: Sequen
     """
     left_out = '; '.join(f'{axis}: {", ".join(map(str, names))}'
                          for axis, names in settings()['left_out_of_tuning'].items())
-    parts = ['# Proof: a blind trial', '', _ABOUT.format(
-        sources=' '.join(f'--from {name}' for name in sources), left_out=left_out)]
+    about = _ABOUT.format(sources=' '.join(f'--from {name}' for name in sources))
+    parts = ['# Proof: a blind trial', '', about, *textwrap.wrap(
+        f'Left out of tuning: {left_out}.', 98), '']
     if 'report' not in sections:
-        parts += ['No set is reported at this state of the diagnosis: what follows was seen '
-                  'while it was tuned. The next report is made by', '',
+        parts += ['No set is reported at this state of the diagnosis: what follows was seen',
+                  'while it was tuned. A report is made by', '',
                   '    lg_husky prove --report --cases 600 --seed 90000 --world mix '
                   '--out report --page docs/proof.md', '']
     for name, title in TITLES.items():
