@@ -59,8 +59,8 @@ def needs(effects: Iterable[str]) -> frozenset[str]:
 
 def absent_from(world: str) -> frozenset[str]:
     """Return the effects that a world cannot hide."""
-    return {'g1': _WITHOUT_LOOP, 'g2': _WITHOUT_ENGINE, 'g4': _WITHOUT_ENGINE, 'g3': _HIDDEN_BY_LOOP}.get(
-        world, frozenset())
+    return {'g1': _WITHOUT_LOOP, 'g2': _WITHOUT_ENGINE, 'g4': _WITHOUT_ENGINE,
+            'g3': _HIDDEN_BY_LOOP}.get(world, frozenset())
 
 
 def subsystem(effect: str) -> str:
