@@ -184,16 +184,17 @@ class DiagnosisResult:
 
 
 def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),
-             jobs: int | None = None, scheduler: str | None = None, topics: Topics = None,
+             jobs: int | None = None, topics: Topics = None,
              progress: Shown = True) -> DiagnosisResult:
     """Say which physics a model lacks; see :meth:`lg_husky_sim.Husky.diagnose`."""
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # each process has its own core
+    from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case
     from lg_husky_sim.diagnosis.diagnose import diagnose as run
-    from lg_husky_sim.diagnosis.workers import Workers
 
     recordings, baseline = listed(recordings), listed(baseline)
-    with shown(progress) as report, Workers(jobs or 1, scheduler) as workers:
+    with shown(progress) as report:
         after = read_all(recordings, topics=topics, progress=lambda stage, _: report(stage, 0.0))
         before = read_all(baseline, topics=topics, progress=lambda stage, _: report(stage, 0.0))
-        case = run(after, husky.model, report, before, workers)
+        case = change_case(after, before, husky.model, report, jobs=jobs or 1) if before else run(
+            after, husky.model, report, jobs=jobs or 1)
     return DiagnosisResult(case, tuple(after), husky, tuple(before))

@@ -202,7 +202,7 @@ class Husky(Graph):
                         jobs=jobs, scheduler=scheduler, topics=topics, progress=progress)
 
     def diagnose(self, recordings: Recordings, *, baseline: Recordings = (),
-                 jobs: int | None = None, scheduler: str | None = None, topics: Topics = None,
+                 jobs: int | None = None, topics: Topics = None,
                  progress: Shown = True) -> DiagnosisResult:
         """
         Say which physics this model lacks that recordings show.
@@ -214,8 +214,6 @@ class Husky(Graph):
             Of the same robot before a change; then the question is what changed.
         jobs : int, optional
             Processes; 1 by default in Python, where a script may not be importable.
-        scheduler : str, optional
-            Dask scheduler in place of processes.
         topics : mapping of str to str, optional
             Topics of the recordings chosen by hand.
         progress : bool or callable
@@ -233,7 +231,7 @@ class Husky(Graph):
             If the recordings cannot be those of a Husky.
         """
         from lg_husky_sim.api.diagnosing import diagnose
-        return diagnose(self, recordings, baseline=baseline, jobs=jobs, scheduler=scheduler,
+        return diagnose(self, recordings, baseline=baseline, jobs=jobs,
                         topics=topics, progress=progress)
 
     def save(self, path: PathLike) -> Path:

@@ -34,16 +34,13 @@ from lg_husky_sim.cli.several import SeveralWords
               help='Kept for reproducible scripts: the search itself draws nothing by chance.')
 @click.option('--jobs', type=click.IntRange(min=1), default=None, metavar='N',
               help='Processes to use; as many as there are cores by default.')
-@click.option('--scheduler', default=None, metavar='ADDRESS',
-              help='Dask scheduler that takes the work instead (tcp://10.0.0.1:8786); its workers '
-                   'need this package.')
 @click.option('--report/--no-report', 'with_report', default=True, show_default=True,
               help='Whether to write report.html and the pictures, a third of the time.')
 @spoken(page=True)
 def command(
     recordings: tuple[str, ...], out: Path, baselines: tuple[str, ...], robot: Path | None,
     settings: tuple[str, ...], topics: tuple[str, ...], seed: int, jobs: int | None,
-    scheduler: str | None, with_report: bool, say: Output,
+    with_report: bool, say: Output,
 ) -> None:
     """
     Say what physics a model lacks, where it shows, and how much better it gets with it.
@@ -67,7 +64,7 @@ def command(
     with say.stages() as report:
         found = husky.diagnose(
             recordings, baseline=baselines, jobs=jobs or os.cpu_count() or 1,
-            scheduler=scheduler, topics=TopicMap.parse(topics), progress=report)
+            topics=TopicMap.parse(topics), progress=report)
         try:
             report('report and pictures' if with_report else 'files', 0.95)
             page = found.save(out, with_report, given_command(),

@@ -39,7 +39,8 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     the other one refitted to it; the drive on which neither can imitate the other wins.
     """
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    from lg_husky_sim.diagnosis.planning import DECISIVE, drives, plan
+    from lg_husky_sim.diagnosis.planning import drives, plan
+    from lg_husky_sim.diagnosis.settings import setting
     from lg_husky_sim.errors import SettingsError
     from tqdm import tqdm
 
@@ -61,7 +62,7 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     _write(out, best.manoeuvre, f'{best.manoeuvre.about}; tells {one.name} and {two.name} apart '
                                 f'by {best.nats:.0f} nats')
     click.echo(f'{out}: {best.manoeuvre.name}, {best.manoeuvre.about}')
-    if best.nats < DECISIVE:
+    if best.nats < setting('decisive'):
         click.echo('None of these drives decides: another sensor is needed, or more speed.')
 
 

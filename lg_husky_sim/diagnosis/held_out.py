@@ -5,28 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 import math
 
 from lg_husky_sim.comparison.metrics import channel_errors, pooled, SquareSum, tracking
 from lg_husky_sim.comparison.replay import replay
-from lg_husky_sim.diagnosis.fits import first_metric, Fit, fit_structure
-from lg_husky_sim.husky.model import compile_model
-from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.diagnosis.evidence.drives import drive_of
+from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
+from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.identification.noise import Metric
-from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.recording import Segment, windows
 
 #: Longest stretch that is driven without a new start [s].
 LONGEST = 60.0
 #: Shortest segment that is split into a fitted and a held-out half [s].
 SPLIT = 8.0
-
-
-def plant_of(fit: Fit) -> Plant:
-    """Return the plant of a fit."""
-    return compile_model(fit.structure).at(fit.parameters)
 
 
 def errors(plant: Plant, segments: Sequence[Segment]) -> dict[str, float]:
@@ -101,60 +93,30 @@ def _cut(segment: Segment, start: float, end: float) -> Segment:
     return near
 
 
-def refitted(fit: Fit, nominal: Parameters, train: Observations, metric: Metric) -> Fit:
-    """
-    Refit a structure to some of the data.
-
-    Parameters
-    ----------
-    fit : Fit
-        On all data.
-    nominal : Parameters
-    train : Observations
-        What to fit now.
-    metric : Metric
-        Of all data: its correlations are kept.
-
-    Returns
-    -------
-    Fit
-        The given one where the refit cannot be evaluated.
-    """
-    white = first_metric(train, train.predict(plant_of(fit)))
-    weighted = replace(white, filters=metric.filters, parts=metric.parts)
-    sizes = {**fit.parameters, **fit.solution.values}
-    again = fit_structure(train, fit.structure, nominal, weighted, fit.solution.values, sizes,
-                          steps=4, polish=False)
-    return again or fit
-
-
-def held_out_errors(plain: Fit, final: Fit, nominal: Parameters, segments: Sequence[Segment],
-                    metric: Metric, momentary: bool = False
+def held_out_errors(found: Search, parts: Sequence[Segment]
                     ) -> tuple[dict[str, float], dict[str, float]]:
     """
     Return the errors of both models on data that neither was fitted to.
 
     Parameters
     ----------
-    plain, final : Fit
-        Recalibrated only, and with what was found.
-    nominal : Parameters
-    segments : sequence of Segment
-    metric : Metric
-    momentary : bool
-        Whether the wheel rates are those of the moment.
+    found : Search
+    parts : sequence of Segment
 
     Returns
     -------
     dict of str to float
-        Of the plain model.
+        Recalibrated on the other data only.
     dict of str to float
-        Of the augmented model.
+        With what was found, its numbers from the other data.
     """
-    train, test = split(segments)
-    if not train or not test:
+    train, test = split(parts)
+    drives = [d for d in map(drive_of, train) if d is not None]
+    if not drives or not test:
         return {}, {}
-    some = observations(train).read_as(momentary)
-    pair = [errors(plant_of(refitted(fit, nominal, some, metric)), test)
-            for fit in (plain, final)]
-    return pair[0], pair[1]
+    results = []
+    for fit in (found.plain, found.final):
+        evidence = evidence_of(drives, found.evidence.names, fit.point, found.evidence.noise,
+                               found.evidence.pool)
+        results.append(errors(evidence.fit(fit.point, rounds=3).point.plant, test))
+    return results[0], results[1]

@@ -11,30 +11,31 @@ the sensors' noise, is what a recording of that drive would say in favour of the
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 import math
 
 from lg_husky_sim.comparison.output import simulate_commands
-from lg_husky_sim.diagnosis.candidates import changed_candidates, effect_entries
-from lg_husky_sim.diagnosis.fits import fit_structure
+from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drive_of
+from lg_husky_sim.diagnosis.evidence.evidence import beginning, evidence_of
+from lg_husky_sim.diagnosis.evidence.noise import Noise
+from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, effect_unknowns
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
+from lg_husky_sim.diagnosis.localisation import NAMES
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import DiagnosisError, LgHuskyError
 from lg_husky_sim.husky.effects import check_distinct, Effect
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.parameters import Parameters
-from lg_husky_sim.identification.noise import Metric
-from lg_husky_sim.identification.problem import Observations, observations
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Segment
 import numpy as np
 
-#: Deviations of the sensors that a drive is judged with [unit of the channel].
-NOISE = {'wheel_left': 0.03, 'wheel_right': 0.03, 'yaw_rate': 0.01, 'advance': 0.04,
-         'turn': 0.03}
-#: Steps of a refit, and starts that it is tried from.
-STEPS = 3
-STARTS = 2
-#: Separation from which one drive decides [nats].
-DECISIVE = 20.0
+#: Intensities of the noise that a drive is judged with, by the names of the settings.
+LEVELS = ('force', 'moment', 'drive', 'force_time', 'moment_time', 'drive_time', 'place_walk',
+          'heading_walk', 'wheel', 'wheel_jitter', 'gyro', 'imu_jitter', 'place', 'heading',
+          'pose_jitter')
 
 
 @dataclass(frozen=True)
@@ -100,13 +101,10 @@ def typical(name: str, structure: Structure, parameters: Parameters, side: str =
     ParameterError
         If the effect is unknown or does not fit the structure.
     """
-    there = next((c for c in changed_candidates(structure, parameters)
-                  if c.effect.id == name and side in ('', c.effect.side)), None)
+    there = next((e for e in structure.effects if e.id == name and side in ('', e.side)
+                  and not e.again), None)
     if there is not None:
-        effect = replace(there.effect, late=False)
-        entries = effect_entries(effect, there.starts[0])
-        return Rival(name, structure.with_effect(effect), parameters.with_entries(*entries),
-                     tuple(dict(start) for start in there.starts[:STARTS]))
+        return _changed(there, structure, parameters)
     bare = Effect(name, side)
     effect = replace(bare, late=False)
     free = [p for p in effect.parameters() if not p.fixed]
@@ -114,12 +112,28 @@ def typical(name: str, structure: Structure, parameters: Parameters, side: str =
     starts = tuple({p.name: p.starts[min(i, len(p.starts) - 1)] for p in free}
                    for i in range(count))
     middle = starts[len(starts) // 2]
-    entries = effect_entries(effect, middle)
+    entries = entries_of(effect, middle)
     whole = structure.with_effect(effect)
     check_distinct(whole.effects)
     compile_model(whole)
     ordered = (middle, *(s for s in starts if s is not middle))
-    return Rival(name, whole, parameters.with_entries(*entries), ordered[:STARTS])
+    return Rival(name, whole, parameters.with_entries(*entries),
+                 ordered[:int(setting('planned_starts'))])
+
+
+def _changed(there: Effect, structure: Structure, parameters: Parameters) -> Rival:
+    # The same effect with other numbers.
+    effect = replace(there, late=False, again=True)
+    now = {later.name: parameters[before.name] for before, later in zip(
+        there.parameters(), effect.parameters(), strict=True)}
+    free = [p for p in effect.parameters() if not p.fixed]
+    starts = []
+    for factor in (setting('planned_change'), 1.0 / setting('planned_change')):
+        starts.append({p.name: min(max(now[p.name] + (factor - 1.0) * max(
+            abs(now[p.name]), 0.5 * abs(p.starts[0])), p.lower), p.upper) for p in free})
+    entries = entries_of(effect, {**now, **starts[0]})
+    return Rival(there.id, structure.with_effect(effect), parameters.with_entries(*entries),
+                 tuple(starts))
 
 
 def drives(speed: float, rate: float) -> tuple[Manoeuvre, ...]:
@@ -174,7 +188,7 @@ def drives(speed: float, rate: float) -> tuple[Manoeuvre, ...]:
     )
 
 
-def recorded(rival: Rival, manoeuvre: Manoeuvre) -> Observations:
+def recorded(rival: Rival, manoeuvre: Manoeuvre) -> Drive:
     """
     Return what the sensors would measure if an explanation were true.
 
@@ -185,23 +199,23 @@ def recorded(rival: Rival, manoeuvre: Manoeuvre) -> Observations:
 
     Returns
     -------
-    Observations
+    Drive
         Without noise.
+
+    Raises
+    ------
+    DiagnosisError
+        If the drive is too short.
     """
     plant = compile_model(rival.structure).at(rival.parameters)
     commands = manoeuvre.commands()
     streams = simulate_commands(plant, commands, 1.0)
-    segment = Segment(manoeuvre.name, 0, float(commands.times[0]), float(commands.times[-1]),
-                      {name: streams[name] for name in (
-                          'command', 'wheels', 'wheel_angles', 'imu', 'pose')})
-    return observations([segment])
-
-
-def _metric(data: Observations) -> Metric:
-    scale = np.zeros(data.measured.size)
-    for name in data.channels:
-        scale[data.channel_mask(name)] = 1.0 / NOISE[name]
-    return Metric(scale, {name: np.ones(1) for name in data.channels})
+    drive = drive_of(Segment(
+        manoeuvre.name, 0, float(commands.times[0]), float(commands.times[-1]),
+        {name: streams[name] for name in ('command', 'wheels', 'wheel_angles', 'imu', 'pose')}))
+    if drive is None:
+        raise DiagnosisError(f'{manoeuvre.name} is too short to tell anything apart')
+    return drive
 
 
 def imitated(truth: Rival, other: Rival, manoeuvre: Manoeuvre) -> tuple[float, str]:
@@ -216,7 +230,8 @@ def imitated(truth: Rival, other: Rival, manoeuvre: Manoeuvre) -> tuple[float, s
     Returns
     -------
     float
-        Half the sum of squares that the refit leaves, in units of the noise [nats].
+        Half the sum of squares of the innovations that the refit leaves, and of the distances
+        from the nominal numbers in tolerances [nats].
     str
         Channel that it leaves most in.
 
@@ -225,21 +240,32 @@ def imitated(truth: Rival, other: Rival, manoeuvre: Manoeuvre) -> tuple[float, s
     DiagnosisError
         If the other one cannot be simulated.
     """
-    data = recorded(truth, manoeuvre)
-    metric = _metric(data)
-    base = {name: other.parameters[name] for name in other.parameters}
+    drive = recorded(truth, manoeuvre)
+    noise = Noise({name: setting(f'planned_{name}') for name in LEVELS})
+    base = base_unknowns(other.parameters, [drive])
     best = None
-    for start in other.starts:
-        sizes = {**base, **start}
-        fit = fit_structure(data, other.structure, other.parameters, metric, sizes, sizes,
-                            STEPS, polish=False)
-        if fit is not None and (best is None or fit.solution.cost < best.solution.cost):
-            best = fit
+    with ThreadPoolExecutor(1) as pool:
+        for start in other.starts:
+            own = effect_unknowns(other.structure.effects[-1], start)
+            entries = entries_of(other.structure.effects[-1], start)
+            point = beginning(other.structure, (*base, *own),
+                              other.parameters.with_entries(*entries), Reading())
+            try:
+                evidence = evidence_of([drive], [drive.recording], point, noise, pool)
+                fit = evidence.fit(point, rounds=int(setting('planned_rounds')))
+            except LgHuskyError:
+                continue
+            nats = 0.5 * float(np.sum(fit.whitened ** 2) + np.sum(fit.point.strain ** 2))
+            if best is None or nats < best[0]:
+                channels = drive.channels[evidence.whiteners[0].frame.order]
+                best = (nats, fit.whitened ** 2, channels)
     if best is None:
         raise DiagnosisError(f'{other.name} cannot be simulated on {manoeuvre.name}')
-    squares = 0.5 * ((data.measured - best.solution.predicted) * metric.scale) ** 2
-    shares = {name: float(np.sum(squares[data.channel_mask(name)])) for name in data.channels}
-    return best.solution.cost, max(shares, key=lambda name: shares[name])
+    shares: dict[str, float] = {}
+    for code in np.unique(best[2]).tolist():
+        name = NAMES[Channel(code)][0]
+        shares[name] = shares.get(name, 0.0) + float(np.sum(best[1][best[2] == code]))
+    return best[0], max(shares, key=lambda name: shares[name])
 
 
 def plan(one: Rival, two: Rival, manoeuvres: Sequence[Manoeuvre],
@@ -304,4 +330,4 @@ def named_drive(effects: Sequence[str], structure: Structure, parameters: Parame
         best = plan(one, two, drives(speed, rate))[0]
     except LgHuskyError:
         return ''
-    return best.manoeuvre.about if best.nats > DECISIVE else ''
+    return best.manoeuvre.about if best.nats > setting('decisive') else ''

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
 from lg_husky_sim.diagnosis.diagnose import Case
-from lg_husky_sim.diagnosis.held_out import errors, LONGEST, plant_of, split
-from lg_husky_sim.diagnosis.locate import fingerprints, locate, Located
+from lg_husky_sim.diagnosis.held_out import errors, LONGEST, split
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES
+from lg_husky_sim.diagnosis.localisation import Missing, missing_efforts, strengths
 from lg_husky_sim.diagnosis.planning import named_drive
 from lg_husky_sim.diagnosis.report import report_data
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.model_file import ModelFile
@@ -33,7 +35,7 @@ from lg_husky_sim.reporting.data import (
     WITH_FINDING,
 )
 from lg_husky_sim.reporting.sections import Cell, Chart, Drawing, Line, Section, Table
-from lg_husky_sim.reporting.words import capitalised, quantity_with_unit
+from lg_husky_sim.reporting.words import quantity_with_unit
 import numpy as np
 
 if TYPE_CHECKING:
@@ -61,14 +63,14 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
     -------
     ReportData
     """
-    diagnosis, whole = case.diagnosis, case.search.observations
-    plants = {NOMINAL: _plant(case.nominal), RECALIBRATED: plant_of(case.search.plain)}
+    diagnosis = case.diagnosis
+    plants = {NOMINAL: _plant(case.nominal), RECALIBRATED: case.search.plain.point.plant}
     changed = diagnosis.model.structure != diagnosis.plain_model.structure
     if changed and diagnosis.findings:
         plants[WITH_FINDING] = _plant(diagnosis.model)
     columns = tuple(plants)
     parts: list[Predicted] = [
-        (stretch, {label: replay(whole.plant_in(plant, stretch.recording), stretch)
+        (stretch, {label: replay(_in(case, plant, stretch.recording), stretch)
                    for label, plant in plants.items()})
         for stretch in _stretches(case.segments)]
     pair = (columns[-2], columns[-1])
@@ -92,6 +94,12 @@ def _tried(heading: str, build: Callable[[], tuple[Section, ...]]) -> tuple[Sect
         return build()
     except LgHuskyError as error:
         return (Section(heading, (f'This cannot be shown: {error}.',)),)
+
+
+def _in(case: Case, plant: Plant, recording: str) -> Plant:
+    names = case.search.evidence.names
+    earlier = plant.onset.before(names) if plant.onset is not None else ()
+    return plant.in_recording(recording, earlier)
 
 
 def _plant(model: ModelFile) -> Plant:
@@ -124,9 +132,13 @@ def _held_out(case: Case, columns: Sequence[str]) -> list[ErrorTable]:
 
 
 def _parameters(case: Case) -> list[ParameterRow]:
-    nominal, bound = case.nominal.parameters, case.search.plain.solution.at_bound
+    nominal, plain = case.nominal.parameters, case.search.plain.point
+    bound = [u.name for u, place in zip(plain.unknowns, plain.places, strict=True)
+             if min(place - u.lower, u.upper - place) < 1e-6]
     rows = []
     for one in case.diagnosis.recalibration:
+        if one.name not in nominal:
+            continue
         entry = nominal.entry(one.name)
         room = abs(entry.value) * entry.tolerance
         rows.append(ParameterRow(
@@ -138,7 +150,7 @@ def _parameters(case: Case) -> list[ParameterRow]:
 
 def _where(case: Case) -> tuple[Section, ...]:
     diagnosis = case.diagnosis
-    located = locate(case.search.observations, case.search.plain)
+    efforts = missing_efforts(case.search.evidence, case.search.plain)
     plain, final = diagnosis.plain_model.structure, diagnosis.model.structure
     elements = [e for f in diagnosis.findings for e in f.elements
                 if f.side not in _OF_SIDE or _OF_SIDE[f.side].search(e)]
@@ -149,11 +161,11 @@ def _where(case: Case) -> tuple[Section, ...]:
         '; branches that the finding touches are red' if elements else '') + (
         f', new ones dashed: {named}.' if added else '.')
     tables, charts = [], []
-    if located.certain:
-        tables = [Table(('part of the robot', 'relative evidence'), tuple(
-            (name, Cell(f'{100.0 * share:.0f} %', share))
-            for name, share in located.strengths.items()))]
-        charts = _efforts(located)
+    if any(e.evidence > setting('unknown_evidence') for e in efforts):
+        tables = [Table(('balance', 'relative evidence'), tuple(
+            (name.replace('_', ' '), Cell(f'{100.0 * share:.0f} %', share))
+            for name, share in strengths(efforts).items()))]
+        charts = _efforts(efforts)
     terms = new_terms(diagnosis.model, plain)
     sections = [Section(
         'Where in the model', text=('New in the equations:',) if terms else (),
@@ -173,28 +185,19 @@ def _where(case: Case) -> tuple[Section, ...]:
     return tuple(sections)
 
 
-def _efforts(located: Located) -> list[Chart]:
-    explanation, prints = located.explanations[located.best()], fingerprints(located)
-    piece = max(range(len(located.bins)),
-                key=lambda i: float(np.sum(explanation.estimates[i].gains)))
-    estimate = explanation.estimates[piece]
-    name = located.observations.pieces[located.bins[piece].piece].recording
+def _efforts(efforts: Sequence[Missing]) -> list[Chart]:
+    # Of the best balance, in the drive where it is strongest; both sides where it is a wheel's.
+    best = max(efforts, key=lambda e: e.evidence).balance
+    wanted = ('torque_left', 'torque_right') if best.startswith('torque') else (best,)
     charts = []
-    for row, one in enumerate(explanation.inputs):
-        factor = located.responses.factor(
-            located.bins[piece].piece, one.terms[0].factor, estimate.times)
-        spread = 2.0 * np.abs(factor) * estimate.deviations[:, row]
-        stem = f'effort_{row + 1}'
-        charts.append(Chart(stem, f'{capitalised(one.name)} in {name}', (Line(
-            one.name, estimate.times, factor * estimate.values[:, row], spread),),
-            'time [s]', f'[{one.unit}]'))
-        mark = prints[row]
-        if mark.share > 0.0:
-            charts.append(Chart(
-                f'{stem}_law', f'{capitalised(one.name)} against {mark.argument}, which explains '
-                f'{100.0 * mark.share:.0f} % of it', (
-                    Line('moments', mark.at, mark.effort_values, dots=True),
-                    Line('mean', mark.middles, mark.means)), mark.argument, f'[{one.unit}]'))
+    for place, balance in enumerate(wanted):
+        own = [e for e in efforts if e.balance == balance]
+        one = max(own, key=lambda e: float(np.mean((e.values / np.maximum(
+            e.deviations, 1e-12)) ** 2)))
+        name, unit = balance.replace('_', ' '), BALANCES[balance][4]
+        charts.append(Chart(
+            f'effort_{place + 1}', f'Missing {name} in {one.drive.recording}', (Line(
+                name, one.times, one.values, 2.0 * one.deviations),), 'time [s]', f'[{unit}]'))
     return charts
 
 

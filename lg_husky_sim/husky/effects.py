@@ -92,7 +92,7 @@ class EffectParameter:
     source : str
     fixed : bool
         A smoothing or shape constant that is not estimated.
-    everyday : float
+    negligible : float
         How far from none of it a robot may be without anything missing from its model [unit]; 0
         where every size counts.
     """
@@ -104,7 +104,7 @@ class EffectParameter:
     starts: tuple[float, ...]
     source: str
     fixed: bool = False
-    everyday: float = 0.0
+    negligible: float = 0.0
 
     def parameter(self, value: float | None = None) -> Parameter:
         """Return it as a parameter with ``value``, or with its first start."""
@@ -259,7 +259,7 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
     parameters = tuple(
         EffectParameter(key, str(p['unit']), float(p['lower']), float(p['upper']),
                         tuple(float(s) for s in p['starts']), str(p['source']),
-                        bool(p.get('fixed', False)), float(p.get('everyday', 0.0)))
+                        bool(p.get('fixed', False)), float(p.get('negligible', 0.0)))
         for key, p in entry['parameters'].items())
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),

@@ -98,6 +98,10 @@ class Propagator:
         """Return a flat state to start from, as :meth:`InitialStates.flat` says."""
         return self._starts.flat(pose, twist, time, wheel_rates, wheel_angles, command)
 
+    def rates_without_slip(self, twist: BodyTwist) -> tuple[float, float]:
+        """Return the wheel rates [rad/s] at which the wheels' dampers carry no torque."""
+        return self._starts.rates_without_slip(twist)
+
     def run(self, events: Events, initial: FloatArray, *, fine_pose: bool = True) -> FloatArray:
         """
         Drive the plant from a state through all events.

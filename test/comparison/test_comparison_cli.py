@@ -12,7 +12,7 @@ import re
 from typing import Any
 
 from lg_husky_sim.cli.main import run
-from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
 from lg_husky_sim.recording import read_recording, segments, write_recording
@@ -269,7 +269,7 @@ def test_a_model_knows_its_recordings_by_their_folders(bag: Path, tmp_path: Path
         plain.structure.with_effect(
             replace(effect, late=True),
             Onset(OnsetKind.TIME, 1.0, 'tue/drive', ('drive',))),
-        plain.parameters.with_entries(*effect_entries(effect, {'gyro_bias': 0.2})), 'bias')
+        plain.parameters.with_entries(*entries_of(effect, {'gyro_bias': 0.2})), 'bias')
     save_model(model, tmp_path / 'found.yaml')
     turned = {}
     for day in ('mon', 'tue'):

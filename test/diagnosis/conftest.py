@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 
 from lg_husky_sim.comparison.output import simulate_commands
-from lg_husky_sim.diagnosis.candidates import effect_entries
 from lg_husky_sim.diagnosis.diagnose import Case, diagnose
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
@@ -45,7 +45,7 @@ def driven(name: str, hidden: str, seed: int, backwards: bool = False) -> Record
     structure, parameters = model.structure, model.parameters.replacing(ROBOT)
     if effect is not None:
         structure = structure.with_effect(effect)
-        parameters = parameters.with_entries(*effect_entries(effect, sizes))
+        parameters = parameters.with_entries(*entries_of(effect, sizes))
     steps = STEPS[::-1] if backwards else STEPS
     return recorded(name, compile_model(structure).at(parameters), steps, seed)
 

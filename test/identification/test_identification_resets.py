@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lg_husky_sim.diagnosis.candidates import effect_entries
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
@@ -28,7 +28,7 @@ RATE = COLUMNS.index('wheel_left')
 def plant(torque: float) -> Plant:
     model, ripple = load_model(), Effect('torque_ripple', 'both')
     return compile_model(model.structure.with_effect(ripple)).at(model.parameters.with_entries(
-        *effect_entries(ripple, {'ripple_cos': torque, 'ripple_sin': 0.0})))
+        *entries_of(ripple, {'ripple_cos': torque, 'ripple_sin': 0.0})))
 
 
 def simulated(torque: float, angles: FloatArray | None = None) -> FloatArray:
@@ -73,8 +73,8 @@ def test_a_play_and_a_faulty_encoder_do_not_move_the_wheel() -> None:
                            Effect('encoder_scale', 'left'))
     structure = model.structure.with_effect(ripple).with_effect(play).with_effect(scale)
     odd = compile_model(structure).at(model.parameters.with_entries(
-        *effect_entries(ripple, {'ripple_cos': 2.0, 'ripple_sin': 0.0}),
-        *effect_entries(play, {'play': 1.0}), *effect_entries(scale, {'encoder_factor': 0.8})))
+        *entries_of(ripple, {'ripple_cos': 2.0, 'ripple_sin': 0.0}),
+        *entries_of(play, {'play': 1.0}), *entries_of(scale, {'encoder_factor': 0.8})))
     assert odd.sets[0].sensors.encoder_left == pytest.approx(0.8)
     commands = TimeSeries(np.array([0.0, 3.0, 6.0]), np.array(
         [[0.6, 0.0], [-0.6, 0.0], [0.6, 0.0]]), ('forward', 'yaw'))

@@ -13,7 +13,6 @@ from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, Cha
 from lg_husky_sim.diagnosis.before_after.drives import drives, mean_command
 from lg_husky_sim.diagnosis.before_after.prediction import base_of
 from lg_husky_sim.diagnosis.before_after.settings import settings
-from lg_husky_sim.diagnosis.diagnose import diagnose
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.errors import DiagnosisError, RecordingError
 from lg_husky_sim.husky.model_file import load_model
@@ -152,9 +151,10 @@ def test_the_order_of_recordings_does_not_matter() -> None:
 
 
 def test_the_model_that_is_written_drives_like_the_robot_after() -> None:
-    said = diagnose([driven('rec1', {'dry_left': 6.5}, 3, OTHER),
-                     driven('rec2', {'dry_left': 6.5}, 4)], load_model(), silent,
-                    [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)]).diagnosis
+    said = change_case([driven('rec1', {'dry_left': 6.5}, 3, OTHER),
+                        driven('rec2', {'dry_left': 6.5}, 4)],
+                       [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)],
+                       load_model(), silent).diagnosis
     assert said.augmented['wheel_speed_rmse'] < said.plain['wheel_speed_rmse']
     assert {'speed_loop', 'command_latency'} <= {e.id for e in said.model.structure.effects}
     assert said.mismatch[0].subsystem == 'drivetrain'

@@ -1,0 +1,205 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From a search to an answer: verdict, names, numbers, what cannot be told apart, confidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from lg_husky_sim.diagnosis.decision import confidence
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort
+from lg_husky_sim.diagnosis.localisation import where_it_shows
+from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
+from lg_husky_sim.diagnosis.selection.search import Round, Search, Tried
+from lg_husky_sim.diagnosis.separation import separated_by
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.diagnosis.wording import sentence
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Parameter whose sign says to which side an effect acts: positive to the left.
+SIDE_OF = {'yaw_pull': 'pull_moment'}
+
+
+def estimates(fit: Fit, names: Sequence[str], units: Parameters) -> tuple[Estimate, ...]:
+    """
+    Return fitted numbers with their 95 % intervals.
+
+    Parameters
+    ----------
+    fit : Fit
+    names : sequence of str
+        Unknowns.
+    units : Parameters
+        Holds every name.
+
+    Returns
+    -------
+    tuple of Estimate
+        Intervals from the curvature of the cost, priors included, inside the bounds.
+    """
+    nu = setting('student')
+    weight = (nu + 1.0) / (nu + fit.whitened ** 2)
+    normal = (fit.jacobian * weight[:, None]).T @ fit.jacobian + np.diag(
+        fit.point.weights ** 2)
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
+    covariance = np.linalg.pinv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
+    found = []
+    for place, unknown in enumerate(fit.point.unknowns):
+        if unknown.name in names and unknown.kind != 'log':
+            found.append(_estimate(unknown, float(fit.point.places[place]),
+                                   1.96 * float(np.sqrt(max(covariance[place, place], 0.0))),
+                                   units.entry(unknown.name).unit))
+    return tuple(found)
+
+
+def _estimate(unknown: Unknown, place: float, half: float, unit: str) -> Estimate:
+    low, high = max(place - half, unknown.lower), min(place + half, unknown.upper)
+    return Estimate(unknown.name, unknown.value(place), unit, unknown.value(low),
+                    unknown.value(high))
+
+
+def _gains(base: Fit, other: Fit) -> FloatArray:
+    nu = setting('student')
+    before, after = (0.5 * (nu + 1.0) * np.log1p(f.whitened ** 2 / nu) for f in (base, other))
+    found: FloatArray = before - after
+    return found
+
+
+def rivals_of(one: Round) -> tuple[Rivalry, ...]:
+    """Return what else was tried in a round, each effect once, best first."""
+    best: dict[str, Rivalry] = {}
+    named = one.tried[0].hypothesis.effect.id if one.adopted else ''
+    for tried in one.tried:
+        effect = tried.hypothesis.effect
+        if effect.id != named and (effect.id not in best
+                                   or tried.gain > best[effect.id].held_out_gain):
+            best[effect.id] = Rivalry(effect.id, effect.side, max(tried.gain, 0.0))
+    return tuple(sorted(best.values(), key=lambda r: -r.held_out_gain))
+
+
+def is_near(evidence: Evidence, best: Tried, other: Tried) -> bool:
+    """Return whether two names are not told apart, by the margin or Vuong's statistic."""
+    difference = best.score - other.score
+    if difference < setting('near_margin') * best.gain:
+        return True
+    gains = _gains(other.fit, best.fit)
+    blocks, place = [], 0
+    for whitener in evidence.whiteners:
+        frame = whitener.frame
+        times = frame.times[frame.order]
+        own = gains[place:place + times.size]
+        place += times.size
+        index = ((times - times[0]) / setting('block')).astype(np.int64)
+        blocks.append(np.bincount(index, weights=own))
+    sums = np.concatenate(blocks)
+    noise = float(np.std(sums)) * np.sqrt(sums.size)
+    return bool(difference < setting('near_z') * noise)
+
+
+def indistinguishable(search: Search) -> tuple[Indistinguishable, ...]:
+    """Return the sets of effects between which the data do not decide."""
+    found = []
+    for one in search.adopted:
+        best = one.tried[0]
+        near = [t for t in one.tried[1:] if t.gain > 0.0
+                and t.hypothesis.effect.id != best.hypothesis.effect.id
+                and is_near(one.evidence, best, t)]
+        if near:
+            names = tuple(dict.fromkeys([best.hypothesis.effect.id,
+                                         *(t.hypothesis.effect.id for t in near)]))[:4]
+            sensors, manoeuvres = separated_by(names)
+            found.append(Indistinguishable(names, sensors, manoeuvres))
+    return tuple(found)
+
+
+def _acting_side(effect: Effect, numbers: Sequence[Estimate]) -> str:
+    value = next((e.value for e in numbers if e.name == SIDE_OF.get(effect.id)), 0.0)
+    return effect.side if value == 0.0 else 'left' if value > 0.0 else 'right'
+
+
+def findings(search: Search) -> tuple[Finding, ...]:
+    """Return what was adopted, strongest first, with numbers from the joint fit."""
+    found = []
+    total = sum(max(r.tried[0].gain, 0.0) for r in search.adopted) or 1.0
+    for one in search.adopted:
+        best = one.tried[0]
+        effect = next(e for e in search.final.point.structure.effects
+                      if (e.id, e.side) == (best.hypothesis.effect.id,
+                                            best.hypothesis.effect.side))
+        numbers = estimates(search.final, [p.name for p in best.hypothesis.free],
+                            search.final.point.numbers)
+        onset = search.final.point.structure.onset if effect.late else None
+        regime = where_it_shows(one.evidence, _gains(one.base, best.fit))
+        found.append(Finding(
+            effect.id, _acting_side(effect, numbers), effect.kind.subsystem.value,
+            effect.kind.elements, regime, onset, numbers, best.gain, one.chance,
+            min(1.0, best.gain / total), rivals_of(one),
+            sentence(effect, onset, numbers, regime)))
+    return tuple(sorted(found, key=lambda f: -f.held_out_gain))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A verdict with its confidence, and the features that made it."""
+
+    verdict: Verdict
+    sure: float
+    features: confidence.Features
+
+
+def answer(search: Search, rest: Sequence[Effort]) -> Answer:
+    """
+    Decide between the names, unknown and nothing.
+
+    Parameters
+    ----------
+    search : Search
+    rest : sequence of Effort
+        Smooth efforts in what the search leaves, largest evidence first.
+
+    Returns
+    -------
+    Answer
+    """
+    left = max(rest[0].evidence, 0.0) if rest else 0.0
+    first = search.rounds[0]
+    tried = first.tried
+    if not search.adopted:
+        gain = max(tried[0].gain, 0.0) if tried else 0.0
+        features = confidence.Features(gain, 0.0, left / max(gain, 1.0), first.chance)
+        if left > setting('unknown_alone'):
+            return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
+        return Answer(Verdict.NOTHING_MISSING, confidence.of_nothing(features), features)
+    best = tried[0]
+    others = [t.gain for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id]
+    second = max([0.0, *others])
+    features = confidence.Features(best.gain, 1.0 - second / max(best.gain, 1e-9),
+                                   left / max(best.gain, 1e-9), first.chance)
+    if left > setting('unknown_evidence') and features.share > setting('unknown_share'):
+        return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
+    return Answer(Verdict.KNOWN, confidence.of_name(features), features)
+
+
+def unknown_finding(search: Search, rest: Sequence[Effort]) -> Finding:
+    """Return what is missing without a name, by its best smooth description."""
+    first = rest[0]
+    where = {'force': 'a force on the chassis', 'moment': 'a moment on the chassis',
+             'torque_left': 'a torque on the left wheels',
+             'torque_right': 'a torque on the right wheels'}[first.balance]
+    largest = float(np.max(np.abs(first.values), initial=0.0))
+    unit = 'N' if first.balance == 'force' else 'N·m'
+    text = (f'None of the known effects explains it; its best description is {where} as a smooth '
+            f'function of {first.argument.replace("_", " ")}, up to {largest:.3g} {unit}.')
+    side = {'torque_left': 'left', 'torque_right': 'right'}.get(first.balance, 'none')
+    elements = {'force': ('M_H',), 'moment': ('J_H',), 'torque_left': ('J_LW',),
+                'torque_right': ('J_RW',)}[first.balance]
+    one = search.rounds[0]
+    rivals = rivals_of(replace(one, adopted=False))
+    return Finding('unknown', side, first.subsystem, elements, first.argument.replace('_', ' '),
+                   None, (), first.evidence, float('nan'), 1.0, rivals, text)

@@ -1,0 +1,48 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+When a gain is beyond chance.
+
+Twice the gain of a hypothesis with k numbers is nearly chi-square distributed with k degrees of
+freedom on a robot that lacks nothing; with n hypotheses tried, the largest of them exceeds a gain
+with a probability of at most n times that of one.
+"""
+
+from __future__ import annotations
+
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
+from lg_husky_sim.diagnosis.settings import setting
+from scipy.stats import chi2
+
+
+def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidence) -> float:
+    """
+    Return how likely the largest gain is on a robot that lacks nothing.
+
+    Parameters
+    ----------
+    gain : float
+        [nats]
+    hypothesis : Hypothesis
+    tried : int
+        Number of hypotheses and starts.
+    evidence : Evidence
+        Its length says how many onsets were tried.
+
+    Returns
+    -------
+    float
+        At most 1.
+    """
+    count = float(tried)
+    if hypothesis.onset is not None:
+        seconds = sum(d.end - d.start for d in evidence.drives)
+        count *= max(1.0, seconds / setting('onset_resolution'))
+    tail = float(chi2.sf(2.0 * max(gain, 0.0) / setting('inflation'), hypothesis.size))
+    return min(1.0, count * tail)
+
+
+def is_beyond_chance(chance: float) -> bool:
+    """Return whether a gain is beyond the stated false-alarm rate."""
+    return chance < setting('false_alarm_rate')

@@ -1,0 +1,63 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The slow part of a robot's linear model, as the deviation model of the whitener needs it."""
+
+from __future__ import annotations
+
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: States of the graph that carry the motion of the base.
+SLOW = ('v(M_H)', 'omega(J_H)')
+
+
+def _axle_columns(states: tuple[str, ...], values: dict[str, float]) -> tuple[FloatArray, ...]:
+    columns = []
+    for side in ('L', 'R'):
+        whole, rear = f'omega(J_{side}W)', f'omega(J_R{side})'
+        name, share = (whole, 1.0) if whole in states else (rear, 0.5)
+        column = np.zeros(len(states))
+        column[states.index(name)] = 1.0 / (share * values['wheel_inertia'])
+        columns.append(column)
+    return tuple(columns)
+
+
+def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: float
+               ) -> FloatArray:
+    """
+    Reduce a plant to forward speed and yaw rate.
+
+    The other states are in balance at every moment: with x = (s, f), ``0 = A_fs s + A_ff f +
+    E_f d``, so that ``s' = (A_ss - A_sf A_ff^-1 A_fs) s + (E_s - A_sf A_ff^-1 E_f) d``, and the
+    wheels read ``W s + W_d d`` likewise. Only for linear deviations from a simulation.
+
+    Parameters
+    ----------
+    plant : Plant
+        Its first set is taken.
+    mass, yaw_inertia, wheel_inertia : float
+        [kg], [kg·m²], [kg·m²].
+
+    Returns
+    -------
+    numpy.ndarray, shape (20,)
+        In the order of :data:`whitener.MODEL`.
+    """
+    one, states = plant.sets[0], plant.states
+    n = len(states)
+    slow = [states.index(name) for name in SLOW]
+    fast = [i for i in range(n) if i not in slow]
+    force, moment = np.zeros(n), np.zeros(n)
+    force[slow[0]], moment[slow[1]] = 1.0 / mass, 1.0 / yaw_inertia
+    inputs = np.column_stack([
+        force, moment, *_axle_columns(states, {'wheel_inertia': wheel_inertia})])
+    a_ff = one.a[np.ix_(fast, fast)]
+    follow = -np.linalg.solve(a_ff, np.hstack([one.a[np.ix_(fast, slow)], inputs[fast]]))
+    a_sf = one.a[np.ix_(slow, fast)]
+    a_slow = one.a[np.ix_(slow, slow)] + a_sf @ follow[:, :2]
+    e_slow = inputs[slow] + a_sf @ follow[:, 2:]
+    wheels = one.rows[:2, fast] @ follow
+    wheels[:, :2] += one.rows[:2, slow]
+    left, right = wheels[:, [0, 1, 4, 5]]
+    return np.concatenate([a_slow.ravel(), e_slow[0], e_slow[1], left, right])

@@ -1,0 +1,268 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Segments of recordings as drives: what was commanded, and what each sensor read when."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+import enum
+from typing import Any, TypeVar
+
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import RecordingError
+from lg_husky_sim.recording import Recording, Segment, segments
+from lg_husky_sim.recording.wheels import unwrapped
+from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
+from lg_husky_sim.simulation.starting import at_rest
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+
+Kept = TypeVar('Kept')
+
+
+class Channel(enum.IntEnum):
+    """What one number of a drive is a reading of; the value is its code in the whitener."""
+
+    WHEEL_LEFT = 0
+    WHEEL_RIGHT = 1
+    YAW_RATE = 2
+    X = 3
+    Y = 4
+    HEADING = 5
+    ANGLE_LEFT = 6
+    ANGLE_RIGHT = 7
+
+
+#: Units of the channels.
+UNITS = {Channel.WHEEL_LEFT: 'rad/s', Channel.WHEEL_RIGHT: 'rad/s', Channel.YAW_RATE: 'rad/s',
+         Channel.X: 'm', Channel.Y: 'm', Channel.HEADING: 'rad', Channel.ANGLE_LEFT: 'rad',
+         Channel.ANGLE_RIGHT: 'rad'}
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """
+    One segment, ready to be predicted.
+
+    Parameters
+    ----------
+    recording : str
+    index : int
+        Of the segment in its recording.
+    start, end : float
+        [s] on the recording's clock.
+    commands : TimeSeries
+    wheel_times, imu_times, pose_times : numpy.ndarray
+        Stamps [s]; empty where a stream is missing.
+    counted : bool
+        Whether the wheels are known as angles only, not as rates.
+    measured : numpy.ndarray, shape (n,)
+        All readings, channel after channel; headings are unwrapped.
+    channels : numpy.ndarray of int, shape (n,)
+        :class:`Channel` of each reading.
+    times : numpy.ndarray, shape (n,)
+        Stamp of each reading [s].
+    heading : numpy.ndarray, shape (n_pose,)
+        Measured heading, smoothed [rad].
+    pose : Pose
+        At the start.
+    twist : BodyTwist
+        At the start.
+    wheel_rates, wheel_angles : tuple of float
+        At the start, left and right [rad/s], [rad].
+    still : bool
+        Whether the robot is at rest at the start.
+    stamped : bool
+        Whether the commands carry stamps of their own, and not only the time of their receipt.
+    """
+
+    recording: str
+    index: int
+    start: float
+    end: float
+    commands: TimeSeries
+    wheel_times: FloatArray
+    imu_times: FloatArray
+    pose_times: FloatArray
+    counted: bool
+    measured: FloatArray
+    channels: NDArray[np.int64]
+    times: FloatArray
+    heading: FloatArray
+    pose: Pose
+    twist: BodyTwist
+    wheel_rates: tuple[float, float] | None
+    wheel_angles: tuple[float, float]
+    still: bool
+    stamped: bool = True
+
+    @property
+    def name(self) -> str:
+        """Recording and number of the segment."""
+        return f'{self.recording}/{self.index}'
+
+    def remembered(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
+        """Return what was made of this drive under a key, among the last few; else make it."""
+        memory: dict[Hashable, Any] = self.__dict__.setdefault('_memory', {})
+        if key not in memory:
+            made = make()
+            while len(memory) >= 8:
+                memory.pop(next(iter(memory)), None)
+            memory[key] = made
+            return made
+        found: Kept = memory.get(key) or make()
+        return found
+
+    def slice_of(self, channel: Channel) -> slice:
+        """Return where a channel's readings stand; empty where there are none."""
+        first = int(np.searchsorted(self.channels, int(channel), side='left'))
+        last = int(np.searchsorted(self.channels, int(channel), side='right'))
+        return slice(first, last)
+
+
+def smoothed(times: FloatArray, values: FloatArray, width: float) -> FloatArray:
+    """
+    Smooth samples by penalising their second derivative (Whittaker).
+
+    Parameters
+    ----------
+    times, values : numpy.ndarray, shape (n,)
+    width : float
+        Time over which it smooths [s].
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+    """
+    n = times.size
+    if n < 4:
+        return np.array(values)
+    step = float(np.median(np.diff(times)))
+    penalty = (width / (2.0 * np.pi * max(step, 1e-6))) ** 4
+    bands = np.zeros((3, n))
+    bands[2] = 1.0
+    coefficients = np.array([1.0, -2.0, 1.0])
+    for i in range(3):
+        for j in range(i, 3):
+            bands[2 - (j - i), j:n - 2 + j] += penalty * coefficients[i] * coefficients[j]
+    return np.asarray(solveh_banded(bands, values), dtype=np.float64)
+
+
+def _early(series: TimeSeries, start: float, names: Sequence[str]) -> list[float]:
+    part = series.slice(start, start + setting('start_window'))
+    values = part if len(part) else series
+    return [float(np.median(values.column(name)[:12])) for name in names]
+
+
+def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
+    """
+    Prepare a segment.
+
+    Parameters
+    ----------
+    segment : Segment
+    stamped : bool
+        Whether the commands carry stamps of their own.
+
+    Returns
+    -------
+    Drive or None
+        None where it has no command, nothing measured, or is too short.
+    """
+    streams = segment.streams
+    if 'command' not in streams or segment.duration < setting('shortest_segment'):
+        return None
+    start = segment.start
+    wheels, imu, pose = (streams.get(n) for n in ('wheels', 'imu', 'pose'))
+    angles = streams.get('wheel_angles')
+    counted = wheels is None and angles is not None
+    turning = angles if counted else wheels
+    pieces: list[tuple[Channel, FloatArray, FloatArray]] = []
+    rates: tuple[float, float] | None = None
+    if turning is not None and len(turning) > 3:
+        first = Channel.ANGLE_LEFT if counted else Channel.WHEEL_LEFT
+        for offset, side in enumerate(('left', 'right')):
+            values = turning.column(side)
+            pieces.append((Channel(int(first) + offset), turning.times,
+                           unwrapped(values) if counted else values))
+        if not counted:
+            left, right = _early(turning, start, ('left', 'right'))
+            rates = (left, right)
+    yaw, forward = 0.0, 0.0
+    heading = np.zeros(0)
+    place = Pose()
+    if imu is not None and len(imu) > 3:
+        pieces.append((Channel.YAW_RATE, imu.times, imu.column('yaw_rate')))
+        yaw = _early(imu, start, ('yaw_rate',))[0]
+    if pose is not None and len(pose) > 3:
+        raw = np.unwrap(pose.column('heading'))
+        heading = smoothed(pose.times, raw, setting('heading_smoothing'))
+        pieces += [(Channel.X, pose.times, pose.column('x')),
+                   (Channel.Y, pose.times, pose.column('y')), (Channel.HEADING, pose.times, raw)]
+        few = min(len(pose), 5)
+        place = Pose(float(np.median(pose.column('x')[:few])),
+                     float(np.median(pose.column('y')[:few])), float(heading[0]))
+        late = int(np.searchsorted(pose.times, pose.times[0] + 2.0 * setting('start_window')))
+        late = min(max(late, 1), len(pose) - 1)
+        span = float(pose.times[late] - pose.times[0])
+        if span > 0.0:
+            along = ((pose.column('x')[late] - place.x) * np.cos(heading[0])
+                     + (pose.column('y')[late] - place.y) * np.sin(heading[0]))
+            forward = float(along / span)
+            yaw = yaw if imu is not None else float((heading[late] - heading[0]) / span)
+    if not pieces:
+        return None
+    pieces = [(c, t, v) for c, t, v in pieces if np.all(np.isfinite(v))]
+    pieces.sort(key=lambda piece: int(piece[0]))
+    still = at_rest(BodyTwist(forward, yaw), rates) if rates is not None else at_rest(
+        BodyTwist(forward, yaw))
+    begin = (0.0, 0.0)
+    if counted and turning is not None:
+        begin = (float(unwrapped(turning.column('left'))[0]),
+                 float(unwrapped(turning.column('right'))[0]))
+    elif angles is not None and len(angles):
+        begin = (float(np.interp(start, angles.times, unwrapped(angles.column('left')))),
+                 float(np.interp(start, angles.times, unwrapped(angles.column('right')))))
+    empty = np.zeros(0)
+    return Drive(
+        segment.recording, segment.index, start, segment.end, streams['command'],
+        empty if turning is None else turning.times, empty if imu is None else imu.times,
+        empty if heading.size == 0 or pose is None else pose.times, counted,
+        np.concatenate([v for _, _, v in pieces]),
+        np.concatenate([np.full(t.size, int(c), dtype=np.int64) for c, t, _ in pieces]),
+        np.concatenate([t for _, t, _ in pieces]), heading, place,
+        BodyTwist() if still else BodyTwist(forward, yaw), (0.0, 0.0) if still else rates,
+        begin, still, stamped)
+
+
+def drives_of(recordings: Sequence[Recording]) -> tuple[Drive, ...]:
+    """
+    Return all usable drives of recordings.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    tuple of Drive
+
+    Raises
+    ------
+    RecordingError
+        If one has no commands, or nothing that can be compared with a simulation.
+    """
+    found = []
+    for recording in recordings:
+        recording.stream('command')
+        kind = recording.present.get(recording.topics.get('command', ''), '')
+        stamped = kind.endswith('Stamped')
+        own = [d for d in (drive_of(s, stamped) for s in segments(recording)) if d is not None]
+        if not own:
+            raise RecordingError(
+                f'recording {recording.name} has no stretch of {setting("shortest_segment"):g} s '
+                'in which commands and wheels, gyro or pose were all recorded')
+        found += own
+    return tuple(found)

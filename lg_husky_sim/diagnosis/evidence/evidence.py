@@ -1,0 +1,326 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One likelihood for every hypothesis: whitened residuals of an open-loop simulation.
+
+For a structure with numbers p, the residuals ``r(p) = measured - simulated(p)`` of every drive are
+whitened by one fixed linear operator W, and::
+
+    cost(p) = sum (nu+1)/2 log(1 + (W r)^2 / nu) + sum ((p - nominal) / tolerance)^2 / 2
+
+is a negative log posterior (innovations with Student's t). The gain of a hypothesis is what it
+lowers the cost by, in nats: a likelihood ratio of exp(gain).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from lg_husky_sim.diagnosis.evidence.deviation import slow_model
+from lg_husky_sim.diagnosis.evidence.drives import Drive
+from lg_husky_sim.diagnosis.evidence.frames import frame_of
+from lg_husky_sim.diagnosis.evidence.missed_commands import with_missed_commands
+from lg_husky_sim.diagnosis.evidence.noise import fit_noise, Noise, Whitener, whitener_of
+from lg_husky_sim.diagnosis.evidence.observation import Motion, observe, Reading, simulate
+from lg_husky_sim.diagnosis.evidence.unknowns import start_of, Unknown, values_of
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.husky.model import compile_model, Structure
+from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """
+    A structure with numbers: what is simulated.
+
+    Parameters
+    ----------
+    structure : Structure
+    unknowns : tuple of Unknown
+    places : numpy.ndarray, shape (k,)
+        Of the unknowns on their scales.
+    parameters : Parameters
+        Of the model and of its effects; the unknowns' values replace theirs.
+    reading : Reading
+        How the log was made.
+    """
+
+    structure: Structure
+    unknowns: tuple[Unknown, ...]
+    places: FloatArray
+    parameters: Parameters
+    reading: Reading
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Numbers of the model and its effects, by name."""
+        return values_of(self.unknowns, self.places, 'model') | values_of(
+            self.unknowns, self.places, 'effect')
+
+    @cached_property
+    def numbers(self) -> Parameters:
+        """Parameters with the values of the unknowns."""
+        return self.parameters.replacing({
+            name: min(max(value, self.parameters.entry(name).lower),
+                      self.parameters.entry(name).upper)
+            for name, value in self.values.items()})
+
+    @cached_property
+    def plant(self) -> Plant:
+        """The plant with these numbers."""
+        return compile_model(self.structure).at(self.numbers)
+
+    @cached_property
+    def log(self) -> Reading:
+        """How the log was made, with the values of the unknowns."""
+        return self.reading.replacing(values_of(self.unknowns, self.places, 'log'))
+
+    @cached_property
+    def strain(self) -> FloatArray:
+        """Distances of the unknowns from the centres of their priors, in deviations."""
+        centre = np.array([u.centre for u in self.unknowns])
+        found: FloatArray = (self.places - centre) * self.weights
+        return found
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """One over the deviations of the priors."""
+        return np.array([1.0 / u.deviation for u in self.unknowns])
+
+    def at(self, places: FloatArray) -> Point:
+        """Return this structure at other places, inside the bounds."""
+        lower = np.array([u.lower for u in self.unknowns])
+        upper = np.array([u.upper for u in self.unknowns])
+        return replace(self, places=np.clip(places, lower, upper))
+
+
+def beginning(structure: Structure, unknowns: Sequence[Unknown], parameters: Parameters,
+              reading: Reading) -> Point:
+    """Return a structure at the centres of its priors."""
+    return Point(structure, tuple(unknowns), start_of(unknowns), parameters, reading)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """
+    The best point of a structure, as far as the search went.
+
+    Parameters
+    ----------
+    point : Point
+    cost : float
+        Negative log posterior [nats].
+    whitened : numpy.ndarray, shape (n,)
+        Innovations of all drives, one after the other.
+    jacobian : numpy.ndarray, shape (n, k)
+        Of the simulated readings, whitened, by the places.
+    slopes : tuple of numpy.ndarray
+        The same of each drive, not whitened.
+    predicted : tuple of numpy.ndarray
+        Simulated readings of each drive.
+    """
+
+    point: Point
+    cost: float
+    whitened: FloatArray
+    jacobian: FloatArray
+    slopes: tuple[FloatArray, ...]
+    predicted: tuple[FloatArray, ...]
+
+
+class Evidence:
+    """
+    Drives with the noise of their residuals: scores, fits and gains.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+    names : sequence of str
+        Names of the recordings in the order of time.
+    noise : Noise
+    whiteners : sequence of Whitener
+        One a drive.
+    pool : concurrent.futures.Executor
+        Threads for independent simulations.
+    """
+
+    def __init__(self, drives: Sequence[Drive], names: Sequence[str], noise: Noise,
+                 whiteners: Sequence[Whitener], pool: Executor) -> None:
+        self.drives = tuple(drives)
+        self.names = tuple(names)
+        self.noise = noise
+        self.whiteners = tuple(whiteners)
+        self.pool = pool
+        self.count = sum(d.measured.size for d in drives)
+
+    def plants(self, plant: Plant) -> list[Plant]:
+        """Return the plant as it is in each drive."""
+        onset = plant.onset
+        earlier = onset.before(self.names) if onset is not None and onset.recording else ()
+        return [plant.in_recording(d.recording, earlier) for d in self.drives]
+
+    def motions(self, point: Point, probe: bool = False) -> list[Motion]:
+        """Return the simulated motion of each drive."""
+        return [simulate(plant, drive, point.log, probe)
+                for plant, drive in zip(self.plants(point.plant), self.drives, strict=True)]
+
+    def predict(self, point: Point) -> tuple[FloatArray, ...]:
+        """Return the simulated readings of each drive."""
+        return tuple(observe(motion, drive, point.log) for motion, drive in zip(
+            self.motions(point), self.drives, strict=True))
+
+    def whiten(self, columns: Sequence[FloatArray]) -> FloatArray:
+        """Whiten residuals or differences, given drive by drive."""
+        return np.concatenate([w.apply(c) for w, c in zip(self.whiteners, columns, strict=True)])
+
+    def residuals(self, predicted: Sequence[FloatArray]) -> FloatArray:
+        """Return the innovations of simulated readings."""
+        return self.whiten([d.measured - p for d, p in zip(self.drives, predicted, strict=True)])
+
+    def cost(self, whitened: FloatArray, point: Point) -> float:
+        """Return the negative log posterior of a point, up to a constant [nats]."""
+        nu = setting('student')
+        return float(np.sum(0.5 * (nu + 1.0) * np.log1p(whitened * whitened / nu))
+                     + 0.5 * np.sum(point.strain ** 2))
+
+    def derivatives(self, point: Point, predicted: Sequence[FloatArray],
+                    which: Sequence[int]) -> list[FloatArray]:
+        """Return derivatives of the readings of each drive by some of the places."""
+        def column(k: int) -> list[FloatArray]:
+            moved = np.array(point.places)
+            step = point.unknowns[k].step
+            if moved[k] + step > point.unknowns[k].upper:
+                step = -step
+            moved[k] += step
+            shifted = self.predict(point.at(moved))
+            return [(a - b) / step for a, b in zip(shifted, predicted, strict=True)]
+        columns = list(self.pool.map(column, which))
+        return [np.column_stack([c[d] for c in columns]) for d in range(len(self.drives))]
+
+    def fit(self, start: Point, slopes: Sequence[FloatArray] | None = None, *,
+            rounds: int = 8, renew: Sequence[int] | None = None, inflation: float = 1.0) -> Fit:
+        """
+        Fit the unknowns of a point by Gauss-Newton steps.
+
+        Derivatives are kept from step to step while they foretell what a step gains.
+
+        Parameters
+        ----------
+        start : Point
+        slopes : sequence of numpy.ndarray, optional
+            Derivatives of the readings of each drive by the places; those of ``renew`` are taken
+            anew. All are where none are given.
+        rounds : int
+            Largest number of steps.
+        renew : sequence of int, optional
+            Places whose derivatives are taken anew, at first and where steps disappoint; all of
+            them if not given.
+        inflation : float
+            Factor on the standard deviation of the noise.
+
+        Returns
+        -------
+        Fit
+        """
+        point = start
+        predicted = self.predict(point)
+        whitened = self.residuals(predicted) / inflation
+        cost = self.cost(whitened, point)
+        which = list(range(len(point.unknowns)) if renew is None else renew)
+        raw = [np.zeros((d.measured.size, len(point.unknowns))) for d in self.drives] if (
+            slopes is None) else [np.array(one) for one in slopes]
+        fresh = slopes is not None and renew is None
+        damping, nu = 1e-6, setting('student')
+        rows = self.whiten(raw) / inflation if fresh else np.zeros((0, 0))
+        for _ in range(rounds):
+            if not fresh:
+                for old, new in zip(raw, self.derivatives(point, predicted, which), strict=True):
+                    old[:, which] = new
+                rows = self.whiten(raw) / inflation
+            weight = (nu + 1.0) / (nu + whitened * whitened)
+            normal = (rows * weight[:, None]).T @ rows + np.diag(point.weights ** 2)
+            slope = rows.T @ (weight * whitened) - point.weights * point.strain
+            scale = np.diag(normal) + 1e-12
+            before, fell, hoped = cost, False, 1.0
+            for _ in range(5):
+                move = np.linalg.solve(normal + damping * np.diag(scale), slope)
+                tried = point.at(point.places + move)
+                hoped = float(slope @ move - 0.5 * move @ normal @ move)
+                try:
+                    seen = self.predict(tried)
+                except LgHuskyError:
+                    damping = max(damping, 1e-3) * 10.0
+                    continue
+                after = self.residuals(seen) / inflation
+                value = self.cost(after, tried)
+                if np.isfinite(value) and value < cost:
+                    point, predicted, whitened, cost = tried, seen, after, value
+                    damping = max(damping * 0.1, 1e-9)
+                    fell = True
+                    break
+                if fresh:
+                    break
+                damping = max(damping, 1e-3) * 10.0
+            if not fell:
+                if fresh and hoped > setting('fit_converged'):
+                    fresh = False
+                    continue
+                break
+            if before - cost < setting('fit_converged'):
+                break
+            fresh = before - cost > setting('trusted_slopes') * hoped
+        return Fit(point, cost, whitened, rows, tuple(raw), predicted)
+
+    def renoised(self, fit: Fit, rounds: int = 6) -> Evidence:
+        """
+        Return this evidence with intensities that are likeliest for a fit's residuals.
+
+        Parameters
+        ----------
+        fit : Fit
+        rounds : int
+            Largest number of steps.
+
+        Returns
+        -------
+        Evidence
+        """
+        frames = [frame_of(d, m, p, fit.point.log) for d, m, p in zip(
+            self.drives, self.motions(fit.point, True), fit.predicted, strict=True)]
+        if len(self.whiteners) == len(frames):
+            frames = with_missed_commands(frames, self.whiteners, fit.whitened)
+        models = self.deviations(fit.point)
+        residuals = [d.measured - p for d, p in zip(self.drives, fit.predicted, strict=True)]
+        noise = fit_noise(self.noise, frames, models, residuals, self.pool, rounds)
+        whiteners = [whitener_of(f, m, noise) for f, m in zip(frames, models, strict=True)]
+        return Evidence(self.drives, self.names, noise, whiteners, self.pool)
+
+    def deviations(self, point: Point) -> list[FloatArray]:
+        """Return the deviation model of each drive."""
+        numbers = point.numbers
+        return [slow_model(plant, numbers['mass'], numbers['yaw_inertia'],
+                           numbers['wheel_inertia']) for plant in self.plants(point.plant)]
+
+    def with_whiteners(self, whiteners: Sequence[Whitener]) -> Evidence:
+        """Return this evidence with other whiteners."""
+        return Evidence(self.drives, self.names, self.noise, whiteners, self.pool)
+
+
+def evidence_of(drives: Sequence[Drive], names: Sequence[str], point: Point, noise: Noise,
+                pool: Executor) -> Evidence:
+    """Return the evidence of drives under a first guess of the noise."""
+    blank = Evidence(drives, names, noise, (), pool)
+    motions = blank.motions(point, True)
+    predicted = [observe(m, d, point.log) for m, d in zip(motions, drives, strict=True)]
+    frames = [frame_of(d, m, p, point.log) for d, m, p in zip(
+        drives, motions, predicted, strict=True)]
+    models = blank.deviations(point)
+    return Evidence(drives, names, noise, [
+        whitener_of(f, m, noise) for f, m in zip(frames, models, strict=True)], pool)

@@ -1,0 +1,107 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the whitener needs of a drive and does not depend on the noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
+from lg_husky_sim.diagnosis.evidence.observation import (
+    Motion,
+    probe_times,
+    Reading,
+    wheel_lag,
+)
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """
+    What the whitener needs of a drive and does not depend on the noise.
+
+    Parameters
+    ----------
+    drive : Drive
+    times : numpy.ndarray, shape (n,)
+        When each reading was true [s].
+    order : numpy.ndarray of int, shape (n,)
+        Readings in the order of time.
+    cosine, sine : numpy.ndarray, shape (n,)
+        Direction of the base at each reading.
+    slopes : numpy.ndarray, shape (n,)
+        Rate of change of each reading [its unit/s].
+    kicks : numpy.ndarray, shape (n_kicks, 3)
+        Times at which a command seems lost [s], and variances of the wheels' rates [(rad/s)²].
+    """
+
+    drive: Drive
+    times: FloatArray
+    order: np.typing.NDArray[np.int64]
+    cosine: FloatArray
+    sine: FloatArray
+    slopes: FloatArray
+    kicks: FloatArray
+
+
+def frame_of(drive: Drive, motion: Motion, predicted: FloatArray, reading: Reading) -> Frame:
+    """
+    Return the frame of a drive, from a simulation of it.
+
+    Parameters
+    ----------
+    drive : Drive
+    motion : Motion
+    predicted : numpy.ndarray, shape (n,)
+        Observed of the motion.
+    reading : Reading
+    """
+    times = np.array(drive.times)
+    lag = wheel_lag(reading)
+    is_wheel = drive.channels <= int(Channel.WHEEL_RIGHT)
+    times[is_wheel] -= lag
+    np.clip(times, drive.start, None, out=times)
+    heading = (np.interp(times, drive.pose_times, drive.heading) if drive.pose_times.size else
+               np.interp(times, probe_times(drive), motion.column('heading', 'probe')))
+    slopes = np.zeros(times.size)
+    for channel in Channel:
+        part = drive.slice_of(channel)
+        if part.stop - part.start > 3:
+            slopes[part] = _slopes(drive.times[part], predicted[part])
+    kicks = _lost_commands(drive, motion)
+    order = np.argsort(times, kind='stable')
+    return Frame(drive, times, order, np.cos(heading), np.sin(heading), slopes, kicks)
+
+
+def _slopes(times: FloatArray, values: FloatArray) -> FloatArray:
+    # Backward over one interval: what a wheel has done before its stamp; forward at the first.
+    span = np.maximum(np.diff(times), 1e-4)
+    rate = np.diff(values) / span
+    slopes = np.concatenate([rate[:1], rate])
+    # A step between two stamps counts at both of them.
+    slopes[:-1] = np.where(np.abs(rate) > np.abs(slopes[:-1]), rate, slopes[:-1])
+    return slopes
+
+
+def _lost_commands(drive: Drive, motion: Motion) -> FloatArray:
+    # Where a command seems lost: when it would have come and when the next one came, with half
+    # of the step of the wheels' rates, squared.
+    stamps = drive.commands.times
+    found = []
+    if stamps.size > 3:
+        gaps = np.diff(stamps)
+        usual = float(np.median(gaps))
+        for place in np.flatnonzero((gaps > setting('lost_gap') * usual)
+                                    & (gaps < setting('pause') * usual)):
+            begin, end = stamps[place] + 0.5 * usual, stamps[place + 1]
+            steps = []
+            for side in ('left', 'right'):
+                before, after = np.interp([begin, end + usual], probe_times(drive),
+                                          motion.column(f'wheel_{side}', 'probe'))
+                steps.append((0.5 * (after - before)) ** 2)
+            found += [[begin, *steps], [end, *steps]]
+    kicks = np.array(found).reshape(-1, 3)
+    return kicks[np.argsort(kicks[:, 0], kind='stable')]

@@ -1,0 +1,295 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the sensors of a drive would have read of a simulated motion.
+
+Places are led along the measured heading: an error of the simulated heading would otherwise turn
+the whole way behind it, and a residual of place is meant to tell of speed. Wheel rates are
+differences of angles over the time in which an encoder counts, or followed by a low pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+import enum
+
+from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.plant import Plant, SensorModel
+from lg_husky_sim.signals import BodyTwist, FloatArray, TimeSeries
+from lg_husky_sim.simulation.events import COLUMNS, Events, Propagator
+from lg_husky_sim.simulation.starting import commanded_until
+import numpy as np
+from scipy.signal import lfilter
+
+
+class WheelReading(enum.Enum):
+    """How the rate of a wheel is made, and where in its window the stamp lies."""
+
+    WINDOW_END = 'mean over a window that ends at the stamp'
+    WINDOW_MIDDLE = 'mean over a window around the stamp'
+    WINDOW_START = 'mean over a window that begins at the stamp'
+    FILTERED = 'low-passed'
+
+
+@dataclass(frozen=True)
+class Reading:
+    """
+    How a log was made: what is estimated with the rest.
+
+    Parameters
+    ----------
+    wheels : WheelReading
+    values : mapping of str to float
+        ``wheel_window`` [s] (length of the window, or time constant of the low pass),
+        ``delay_wheels``, ``delay_imu``, ``delay_pose`` [s] (how late stamps are),
+        ``command_delay`` [s] (how late the base applies commands), ``gyro_offset`` [rad/s],
+        ``gyro_gain`` [1] (relative), ``pose_turn`` [rad] (heading of the pose's frame against the
+        direction of travel), ``pose_lever`` [m] (how far ahead of the middle it is).
+    """
+
+    wheels: WheelReading = WheelReading.WINDOW_END
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    def get(self, name: str) -> float:
+        """Return a value; what is not there is zero, but for the window of the encoders."""
+        if name == 'wheel_window':
+            return self.values.get(name, setting('wheel_window'))
+        return self.values.get(name, 0.0)
+
+    def replacing(self, values: Mapping[str, float]) -> Reading:
+        """Return this with other values."""
+        return replace(self, values={**self.values, **values})
+
+
+_COLUMN = {name: i for i, name in enumerate(COLUMNS)}
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """
+    When a drive's motion is read, for one way of reading.
+
+    Parameters
+    ----------
+    events : Events
+        Of the drive's commands and all times.
+    parts : mapping of str to slice
+        Rows of ``wheels`` (ends of the windows), ``begins`` (their begins), ``imu``, ``pose`` and
+        ``probe``.
+    spans : numpy.ndarray, shape (n_wheels,)
+        Lengths of the windows [s].
+    """
+
+    events: Events
+    parts: Mapping[str, slice]
+    spans: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """
+    A simulated drive where its sensors read it.
+
+    Parameters
+    ----------
+    times : numpy.ndarray, shape (n,)
+        [s]
+    rows : numpy.ndarray, shape (n, 15)
+        Columns of the kernel.
+    wanted : Wanted
+    plant : Plant
+    """
+
+    times: FloatArray
+    rows: FloatArray
+    wanted: Wanted
+    plant: Plant
+
+    def column(self, name: str, part: str) -> FloatArray:
+        """Return one column of the kernel at some of the times."""
+        return self.rows[self.wanted.parts[part], _COLUMN[name]]
+
+    def late(self) -> np.typing.NDArray[np.bool_]:
+        """Return where the plant's second set acts."""
+        return self.plant.late(self.times, self.rows[:, _COLUMN['x']])
+
+
+def probe_times(drive: Drive) -> FloatArray:
+    """Return evenly spaced times at which the motion of a drive is looked at between sensors."""
+    count = max(2, int(np.ceil((drive.end - drive.start) / setting('probe_spacing'))) + 1)
+    return np.linspace(drive.start, drive.end, count)
+
+
+def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bool) -> Wanted:
+    wheels: FloatArray = drive.wheel_times - delays[0]
+    imu: FloatArray = drive.imu_times - delays[1]
+    pose: FloatArray = drive.pose_times - delays[2]
+    window = max(reading.get('wheel_window'), setting('shortest_window'))
+    ends: FloatArray = wheels
+    begins: FloatArray = wheels
+    if drive.counted:
+        begins = wheels[:0]
+    elif reading.wheels is WheelReading.FILTERED:
+        begins = wheels[:0]
+        first = min(drive.start, float(np.min(wheels))) if wheels.size else drive.start
+        count = int(np.ceil((drive.end - first) / setting('filter_step'))) + 2
+        ends = np.asarray(first + setting('filter_step') * np.arange(count), dtype=np.float64)
+    else:
+        ends = wheels + {WheelReading.WINDOW_END: 0.0, WheelReading.WINDOW_MIDDLE: 0.5,
+                         WheelReading.WINDOW_START: 1.0}[reading.wheels] * window
+        begins = ends - window
+    groups = {'wheels': ends, 'begins': begins, 'imu': imu, 'pose': pose,
+              'probe': probe_times(drive) if probe else ends[:0]}
+    parts, place = {}, 0
+    for name, times in groups.items():
+        parts[name] = slice(place, place + times.size)
+        place += times.size
+    times = np.maximum(np.concatenate(list(groups.values())), drive.start)
+    delay = reading.get('command_delay')
+    commands = drive.commands if delay == 0.0 else TimeSeries(
+        drive.commands.times + delay, drive.commands.values, drive.commands.names)
+    events = Events(commands, times, start=drive.start)
+    spans = times[parts['wheels']] - times[parts['begins']] if begins.size else begins
+    return Wanted(events, parts, np.maximum(spans, setting('shortest_window')))
+
+
+def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) -> Motion:
+    """
+    Drive a plant with the commands of a drive.
+
+    Parameters
+    ----------
+    plant : Plant
+        As it is in the drive's recording.
+    drive : Drive
+    reading : Reading
+    probe : bool
+        Whether to look at the motion at :func:`probe_times`, too.
+
+    Returns
+    -------
+    Motion
+        Read at the stamps of the sensors less what the first set of the plant is late.
+    """
+    sensors = plant.sets[-1].sensors
+    delays = (sensors.delay_wheels + reading.get('delay_wheels'),
+              sensors.delay_imu + reading.get('delay_imu'),
+              sensors.delay_pose + reading.get('delay_pose'))
+    key = (reading.wheels, reading.get('wheel_window'), reading.get('command_delay'), delays,
+           probe)
+    wanted = drive.remembered(key, lambda: _wanted(drive, reading, delays, probe))
+    propagator = Propagator(plant)
+    events = wanted.events
+    commands = TimeSeries(events.stamps, events.values, drive.commands.names)
+    before = commanded_until(drive.start, commands, drive.twist, drive.wheel_rates)
+    twist = drive.twist
+    if drive.wheel_rates is not None and not drive.still:
+        left, right = drive.wheel_rates
+        ahead = sum(propagator.rates_without_slip(BodyTwist(1.0, 0.0))) / 2.0
+        turning = propagator.rates_without_slip(BodyTwist(0.0, 1.0))
+        twist = BodyTwist(0.5 * (left + right) / ahead, (right - left) / (turning[1] - turning[0]))
+    state = propagator.initial(drive.pose, twist, drive.start, drive.wheel_rates,
+                               drive.wheel_angles, before)
+    rows = propagator.run(events, state, fine_pose=False)
+    times = events.times
+    if events.order is not None:
+        times = np.empty_like(events.times)
+        times[events.order] = events.times
+    return Motion(times, rows, wanted, plant)
+
+
+def _rate(motion: Motion, drive: Drive, side: str, reading: Reading, late: float) -> FloatArray:
+    if reading.wheels is WheelReading.FILTERED:
+        step = setting('filter_step')
+        keep = np.exp(-step / max(reading.get('wheel_window'), 1e-6))
+        rate = motion.column(f'wheel_{side}', 'wheels')
+        followed = lfilter([1.0 - keep], [1.0, -keep], rate, zi=[keep * rate[0]])[0]
+        found: FloatArray = np.interp(
+            drive.wheel_times - late, motion.times[motion.wanted.parts['wheels']], followed)
+        return found
+    turned = (motion.column(f'angle_{side}', 'wheels') - motion.column(f'angle_{side}', 'begins'))
+    return np.asarray(turned / motion.wanted.spans, dtype=np.float64)
+
+
+def wheel_lag(reading: Reading) -> float:
+    """Return how long before its stamp a wheel rate was true, on the mean [s]."""
+    window = reading.get('wheel_window')
+    share = {WheelReading.WINDOW_END: 0.5, WheelReading.WINDOW_MIDDLE: 0.0,
+             WheelReading.WINDOW_START: -0.5, WheelReading.FILTERED: 1.0}[reading.wheels]
+    return reading.get('delay_wheels') + share * window
+
+
+def observe(motion: Motion, drive: Drive, reading: Reading) -> FloatArray:
+    """
+    Return what the sensors of a drive would have read.
+
+    Parameters
+    ----------
+    motion : Motion
+    drive : Drive
+    reading : Reading
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        In the order of ``drive.measured``.
+    """
+    sets = motion.plant.sets
+    if len(sets) == 1 or sets[0].sensors == sets[1].sensors:
+        return _observed(motion, drive, reading, sets[-1].sensors)
+    # A sensor that changes during a drive: read both ways, each with its own delays.
+    late = _observed(motion, drive, reading, sets[1].sensors)
+    before = replace(motion.plant, sets=(sets[0], replace(sets[1], sensors=sets[0].sensors)))
+    early = _observed(simulate(before, drive, reading), drive, reading, sets[0].sensors)
+    return np.where(_on(motion, drive), late, early)
+
+
+def _on(motion: Motion, drive: Drive) -> np.typing.NDArray[np.bool_]:
+    order = np.argsort(motion.times, kind='stable')
+    at = np.interp(drive.times, motion.times[order], motion.late()[order].astype(np.float64))
+    return np.asarray(at > 0.5, dtype=np.bool_)
+
+
+def _observed(motion: Motion, drive: Drive, reading: Reading, sensors: SensorModel
+              ) -> FloatArray:
+    out = np.empty(drive.measured.size)
+    if drive.wheel_times.size:
+        for offset, side in enumerate(('left', 'right')):
+            factor = sensors.encoder_left if side == 'left' else sensors.encoder_right
+            if drive.counted:
+                begin = drive.wheel_angles[offset]
+                out[drive.slice_of(Channel(Channel.ANGLE_LEFT + offset))] = (
+                    begin + factor * (motion.column(f'angle_{side}', 'wheels') - begin))
+            else:
+                out[drive.slice_of(Channel(offset))] = factor * _rate(
+                    motion, drive, side, reading,
+                    sensors.delay_wheels + reading.get('delay_wheels'))
+    if drive.imu_times.size:
+        out[drive.slice_of(Channel.YAW_RATE)] = (
+            sensors.gyro_factor * (1.0 + reading.get('gyro_gain')) * motion.column(
+                'yaw_rate', 'imu') + sensors.gyro_bias + reading.get('gyro_offset'))
+    if drive.pose_times.size:
+        out[drive.slice_of(Channel.HEADING)] = motion.column('heading', 'pose')
+        x, y = _places(drive, motion.column('distance', 'pose'), reading)
+        out[drive.slice_of(Channel.X)] = x
+        out[drive.slice_of(Channel.Y)] = y
+    return out
+
+
+def _places(drive: Drive, distance: FloatArray, reading: Reading
+            ) -> tuple[FloatArray, FloatArray]:
+    # The way between two stamps is the chord of an arc from one measured heading to the next.
+    heading = drive.heading - reading.get('pose_turn')
+    half = 0.5 * np.diff(heading)
+    chord = np.diff(distance) * np.sinc(half / np.pi)
+    middle = heading[:-1] + half
+    lever = reading.get('pose_lever')
+    x = drive.pose.x + distance[0] * np.cos(heading[0]) + np.concatenate(
+        [[0.0], np.cumsum(chord * np.cos(middle))])
+    y = drive.pose.y + distance[0] * np.sin(heading[0]) + np.concatenate(
+        [[0.0], np.cumsum(chord * np.sin(middle))])
+    x += lever * (np.cos(drive.heading) - np.cos(drive.heading[0]))
+    y += lever * (np.sin(drive.heading) - np.sin(drive.heading[0]))
+    return x, y

@@ -1,0 +1,145 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is estimated: numbers of the model, of how the log was made, and of effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+
+from lg_husky_sim.diagnosis.evidence.drives import Drive
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import Effect, EffectParameter
+from lg_husky_sim.husky.parameters import Parameter, Parameters
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Numbers of the model that a recalibration moves within their tolerances.
+RECALIBRATED = ('wheel_damping', 'yaw_damping', 'command_gain', 'turn_ratio', 'mass',
+                'yaw_inertia', 'wheel_inertia', 'motor_resistance', 'wheel_radius', 'track')
+#: Value at which a number of an effect does nothing, where that is not zero.
+NEUTRAL = {'gyro_factor': 1.0, 'encoder_factor': 1.0}
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """
+    One estimated number.
+
+    Parameters
+    ----------
+    name : str
+    kind : str
+        ``model`` (a parameter of the robot), ``log`` (how the log was made) or ``effect``.
+    logarithmic : bool
+        Whether it is estimated on a logarithmic scale.
+    centre, deviation : float
+        Gaussian prior on that scale; an infinite deviation is none.
+    lower, upper : float
+        Bounds on that scale.
+    step : float
+        Step of a difference quotient on that scale.
+    """
+
+    name: str
+    kind: str
+    logarithmic: bool
+    centre: float
+    deviation: float
+    lower: float
+    upper: float
+    step: float
+
+    def value(self, place: float) -> float:
+        """Return the number at a place on the scale [its unit]."""
+        return math.exp(place) if self.logarithmic else place
+
+    def place(self, value: float) -> float:
+        """Return where a number stands on the scale, inside the bounds."""
+        at = math.log(max(value, 1e-300)) if self.logarithmic else value
+        return min(max(at, self.lower), self.upper)
+
+
+def model_unknown(entry: Parameter) -> Unknown:
+    """Return a parameter of the robot as an unknown with its tolerance as the prior."""
+    wide = entry.tolerance >= 1.0
+    deviation = setting('wide_prior') if wide else entry.tolerance
+    centre = math.log(entry.value)
+    return Unknown(entry.name, 'model', True, centre, deviation, math.log(max(entry.lower, 1e-9)),
+                   math.log(entry.upper), setting('model_step'))
+
+
+def log_unknown(name: str, centre: float, deviation: float, lower: float, upper: float
+                ) -> Unknown:
+    """Return a number of how the log was made as an unknown."""
+    return Unknown(name, 'log', False, centre, deviation, lower, upper, 0.2 * deviation)
+
+
+def effect_unknown(parameter: EffectParameter, start: float) -> Unknown:
+    """Return a number of an effect as an unknown; positive ones on a logarithmic scale."""
+    positive = parameter.lower >= 0.0 and parameter.name not in NEUTRAL
+    if positive:
+        least = max(parameter.lower, 1e-4 * abs(start))
+        return Unknown(parameter.name, 'effect', True, math.log(abs(start)), math.inf,
+                       math.log(least), math.log(parameter.upper), setting('effect_step'))
+    size = abs(start - NEUTRAL.get(parameter.name, 0.0))
+    return Unknown(parameter.name, 'effect', False, start, math.inf, parameter.lower,
+                   parameter.upper, setting('effect_step') * max(size, 1e-9))
+
+
+def effect_unknowns(effect: Effect, start: Mapping[str, float]) -> tuple[Unknown, ...]:
+    """Return the free numbers of an effect as unknowns, scaled by where they start."""
+    return tuple(effect_unknown(p, start[p.name]) for p in effect.parameters() if not p.fixed)
+
+
+def base_unknowns(parameters: Parameters, drives: Sequence[Drive]) -> tuple[Unknown, ...]:
+    """
+    Return what a recalibration of a model may move.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Nominal: the centres of the priors; one without tolerance is exact.
+    drives : sequence of Drive
+        Numbers of streams that none has are left out.
+
+    Returns
+    -------
+    tuple of Unknown
+    """
+    found = [model_unknown(parameters.entry(name)) for name in RECALIBRATED
+             if name in parameters and parameters.entry(name).tolerance > 0.0]
+    wheels = any(d.wheel_times.size for d in drives)
+    gyro = any(d.imu_times.size for d in drives)
+    pose = any(d.pose_times.size for d in drives)
+    offset = setting('stamp_offset')
+
+    def add(name: str, deviation: float, centre: float = 0.0) -> None:
+        reach = setting('log_reach') * deviation
+        found.append(log_unknown(name, centre, deviation, centre - reach, centre + reach))
+    late = setting('transport') if all(d.stamped for d in drives) else -setting('receipt')
+    add('command_delay', setting('transport_spread'), late)
+    if wheels:
+        add('delay_wheels', offset)
+    if gyro:
+        add('delay_imu', offset)
+        add('gyro_offset', setting('gyro_offset'))
+        if pose:
+            add('gyro_gain', setting('gyro_gain'))
+    if pose:
+        add('delay_pose', offset)
+        add('pose_turn', setting('pose_turn'))
+        add('pose_lever', setting('pose_lever'))
+    return tuple(found)
+
+
+def values_of(unknowns: Sequence[Unknown], places: FloatArray, kind: str) -> dict[str, float]:
+    """Return the numbers of one kind at places on their scales, by name."""
+    return {u.name: u.value(float(p)) for u, p in zip(unknowns, places, strict=True)
+            if u.kind == kind}
+
+
+def start_of(unknowns: Sequence[Unknown]) -> FloatArray:
+    """Return the centres as places, inside the bounds."""
+    return np.array([min(max(u.centre, u.lower), u.upper) for u in unknowns])

@@ -1,0 +1,305 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whiten residuals of an open-loop simulation: innovations of the deviation model.
+
+What nobody can predict enters at the balances of the graph: a force on the chassis, a moment on
+it and a torque on the wheels of each side, each first-order coloured. With the slow states of the
+linear model (forward speed v, yaw rate w; the wheels follow quasi-statically) their deviation z
+from a simulation is::
+
+    d_i' = -d_i / tau_i + noise                       force, moment, torque left, torque right
+    (v, w)' = A_s (v, w) + E_s d,     bias' = noise
+    heading' = w,  x' = v cos(heading_m) + noise,  y' = v sin(heading_m) + noise
+    angle_side' = wheel_side = W (v, w) + W_d d
+
+and a residual is ``r = H z + sensor noise``. The Kalman filter of this model gives innovations
+``e = r - H z^-`` with variances S; ``e / sqrt(S)`` is white with unit variance when the simulation
+is right, and linear in r, so that simulated differences are whitened by the same gains.
+"""
+
+from __future__ import annotations
+
+from lg_husky_sim.jit import jit, jit_part
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+from numpy.typing import NDArray
+
+Integers = NDArray[np.int64]
+
+#: States of the deviation model: four disturbances, v, w, gyro bias, heading, x, y, two angles.
+STATES = 12
+#: Entries of the model vector, in the order in which the functions below read them.
+MODEL = ('speed_by_speed', 'speed_by_turn', 'turn_by_speed', 'turn_by_turn',
+         'speed_by_force', 'speed_by_moment', 'speed_by_left', 'speed_by_right',
+         'turn_by_force', 'turn_by_moment', 'turn_by_left', 'turn_by_right',
+         'left_by_speed', 'left_by_turn', 'left_by_left', 'left_by_right',
+         'right_by_speed', 'right_by_turn', 'right_by_left', 'right_by_right')
+#: Entries of the process vector: standard deviations of the disturbances [N, N·m, N·m], their
+#: time constants [s], and root intensities of bias [rad/s/sqrt(s)] and place [m/sqrt(s)].
+PROCESS = ('force', 'moment', 'drive', 'force_time', 'moment_time', 'drive_time', 'bias_walk',
+           'place_walk', 'heading_walk')
+
+
+@jit_part
+def _advance(z: FloatArray, j: int, dt: float, cosine: float, sine: float, fade_f: float,
+             fade_m: float, fade_d: float, m: FloatArray) -> None:
+    # One column of z over a short dt: the disturbances decay, the rest by Euler's rule.
+    force, moment, left, right = z[0, j], z[1, j], z[2, j], z[3, j]
+    v, w = z[4, j], z[5, j]
+    z[7, j] += dt * w
+    z[8, j] += dt * cosine * v
+    z[9, j] += dt * sine * v
+    z[10, j] += dt * (m[12] * v + m[13] * w + m[14] * left + m[15] * right)
+    z[11, j] += dt * (m[16] * v + m[17] * w + m[18] * left + m[19] * right)
+    z[4, j] = v + dt * (m[0] * v + m[1] * w + m[4] * force + m[5] * moment + m[6] * left
+                        + m[7] * right)
+    z[5, j] = w + dt * (m[2] * v + m[3] * w + m[8] * force + m[9] * moment + m[10] * left
+                        + m[11] * right)
+    z[0, j] = fade_f * force
+    z[1, j] = fade_m * moment
+    z[2, j] = fade_d * left
+    z[3, j] = fade_d * right
+
+
+@jit_part
+def _transpose(p: FloatArray) -> None:
+    for i in range(p.shape[0]):
+        for j in range(i):
+            p[i, j], p[j, i] = p[j, i], p[i, j]
+
+
+@jit_part
+def _read(z: FloatArray, j: int, channel: int, m: FloatArray) -> float:
+    # H z of one channel for column j.
+    if channel == 0:
+        return float(m[12] * z[4, j] + m[13] * z[5, j] + m[14] * z[2, j] + m[15] * z[3, j])
+    if channel == 1:
+        return float(m[16] * z[4, j] + m[17] * z[5, j] + m[18] * z[2, j] + m[19] * z[3, j])
+    if channel == 2:
+        return float(z[5, j] + z[6, j])
+    if channel == 3:
+        return float(z[8, j])
+    if channel == 4:
+        return float(z[9, j])
+    if channel == 5:
+        return float(z[7, j])
+    if channel == 6:
+        return float(z[10, j])
+    return float(z[11, j])
+
+
+@jit
+def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatArray,
+          cosine: FloatArray, sine: FloatArray, model: FloatArray, process: FloatArray,
+          initial: FloatArray, longest: float, kicks: FloatArray, gain: FloatArray,
+          scale: FloatArray) -> None:
+    """
+    Run the covariances of the filter over the readings of one drive.
+
+    Parameters
+    ----------
+    times, channels, noise, cosine, sine : numpy.ndarray, shape (n,)
+        Of each reading: when it was true [s], its channel, variance of its sensor noise, and the
+        direction of the base's x axis in the world then.
+    order : numpy.ndarray of int, shape (n,)
+        Readings in the order of time.
+    model, process : numpy.ndarray
+        In the order of :data:`MODEL` and :data:`PROCESS`.
+    initial : numpy.ndarray, shape (12,)
+        Variances of the deviation at the first time.
+    longest : float
+        Longest step of a propagation [s].
+    kicks : numpy.ndarray, shape (n_kicks, 3)
+        Times [s], in order, at which the torques on the left and right wheels become uncertain
+        by so much more [(N·m)²].
+    gain : numpy.ndarray, shape (n, 12)
+        Receives the gains, in the order of time.
+    scale : numpy.ndarray, shape (n,)
+        Receives the standard deviations of the innovations, in the order of time.
+    """
+    p = np.zeros((12, 12))
+    for i in range(12):
+        p[i, i] = initial[i]
+    column = np.zeros((12, 1))
+    force_time, moment_time, drive_time = process[3], process[4], process[5]
+    now = times[order[0]]
+    kick = 0
+    while kick < kicks.shape[0] and kicks[kick, 0] < now:
+        kick += 1
+    for k in range(order.size):
+        reading = order[k]
+        left = times[reading] - now
+        while left > 1e-9:
+            dt = min(left, longest)
+            if kick < kicks.shape[0] and kicks[kick, 0] <= times[reading] - left:
+                p[2, 2] += kicks[kick, 1]
+                p[3, 3] += kicks[kick, 2]
+                kick += 1
+            left -= dt
+            fade_f = np.exp(-dt / force_time)
+            fade_m = np.exp(-dt / moment_time)
+            fade_d = np.exp(-dt / drive_time)
+            for j in range(12):
+                _advance(p, j, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+            _transpose(p)
+            for j in range(12):
+                _advance(p, j, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+            p[0, 0] += process[0] ** 2 * (1.0 - fade_f * fade_f)
+            p[1, 1] += process[1] ** 2 * (1.0 - fade_m * fade_m)
+            p[2, 2] += process[2] ** 2 * (1.0 - fade_d * fade_d)
+            p[3, 3] += process[2] ** 2 * (1.0 - fade_d * fade_d)
+            p[6, 6] += process[6] ** 2 * dt
+            p[7, 7] += process[8] ** 2 * dt
+            p[8, 8] += process[7] ** 2 * dt
+            p[9, 9] += process[7] ** 2 * dt
+        now = times[reading]
+        channel = int(channels[reading])
+        for i in range(12):
+            # p is symmetric: H p by columns is p H'.
+            column[i, 0] = _read(p, i, channel, model)
+        variance = _read(column, 0, channel, model) + noise[reading]
+        for i in range(12):
+            gain[k, i] = column[i, 0] / variance
+        for i in range(12):
+            for j in range(12):
+                p[i, j] -= gain[k, i] * column[j, 0]
+        scale[k] = np.sqrt(variance)
+
+
+@jit
+def whiten(residuals: FloatArray, times: FloatArray, channels: Integers, order: Integers,
+           cosine: FloatArray, sine: FloatArray, model: FloatArray, process: FloatArray,
+           longest: float, gain: FloatArray, scale: FloatArray, out: FloatArray) -> None:
+    """
+    Whiten columns of residuals by gains made before.
+
+    Parameters
+    ----------
+    residuals : numpy.ndarray, shape (n, m)
+        In the order of the readings.
+    times, channels, order, cosine, sine, model, process, longest, gain, scale
+        As in :func:`gains`.
+    out : numpy.ndarray, shape (n, m)
+        Receives the whitened innovations, in the order of time.
+    """
+    count = residuals.shape[1]
+    z = np.zeros((12, count))
+    force_time, moment_time, drive_time = process[3], process[4], process[5]
+    now = times[order[0]]
+    for k in range(order.size):
+        reading = order[k]
+        left = times[reading] - now
+        while left > 1e-9:
+            dt = min(left, longest)
+            left -= dt
+            fade_f = np.exp(-dt / force_time)
+            fade_m = np.exp(-dt / moment_time)
+            fade_d = np.exp(-dt / drive_time)
+            for j in range(count):
+                _advance(z, j, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+        now = times[reading]
+        channel = int(channels[reading])
+        for j in range(count):
+            innovation = residuals[reading, j] - _read(z, j, channel, model)
+            out[k, j] = innovation / scale[k]
+            for i in range(12):
+                z[i, j] += gain[k, i] * innovation
+
+
+@jit
+def respond(efforts: FloatArray, grid: FloatArray, times: FloatArray, channels: Integers,
+            order: Integers, cosine: FloatArray, sine: FloatArray, model: FloatArray,
+            longest: float, out: FloatArray) -> None:
+    """
+    Return how the readings of a drive deviate under given efforts at the balances.
+
+    Parameters
+    ----------
+    efforts : numpy.ndarray, shape (n_grid, 4, m)
+        Force [N], moment [N·m], torque of the left and of the right wheels [N·m], m at a time,
+        held from each grid time to the next.
+    grid : numpy.ndarray, shape (n_grid,)
+        Evenly spaced times [s].
+    times, channels, order, cosine, sine, model, longest
+        As in :func:`gains`.
+    out : numpy.ndarray, shape (n, m)
+        Receives the deviations, in the order of the readings.
+    """
+    count = efforts.shape[2]
+    z = np.zeros((12, count))
+    spacing = grid[1] - grid[0]
+    now = times[order[0]]
+    last = grid.size - 1
+    for k in range(order.size):
+        reading = order[k]
+        left = times[reading] - now
+        while left > 1e-9:
+            dt = min(left, longest)
+            at = int((now - grid[0]) / spacing)
+            at = max(0, min(last, at))
+            left -= dt
+            now += dt
+            for j in range(count):
+                for i in range(4):
+                    z[i, j] = efforts[at, i, j]
+                _advance(z, j, dt, cosine[reading], sine[reading], 1.0, 1.0, 1.0, model)
+        now = times[reading]
+        at = max(0, min(last, int((now - grid[0]) / spacing)))
+        channel = int(channels[reading])
+        for j in range(count):
+            for i in range(4):
+                z[i, j] = efforts[at, i, j]
+            out[reading, j] = _read(z, j, channel, model)
+
+
+@jit
+def whiten_switched(change: FloatArray, states: FloatArray, on: NDArray[np.uint8],
+                    times: FloatArray, channels: Integers, order: Integers, cosine: FloatArray,
+                    sine: FloatArray, model: FloatArray, process: FloatArray, longest: float,
+                    gain: FloatArray, scale: FloatArray, out: FloatArray) -> None:
+    """
+    Whiten a change of readings that is switched on and off.
+
+    What a change has built up when it is switched on was not there, so that the filter begins
+    with the opposite of it: r - H (z - z(t)) instead of r - H z; at its end the reverse.
+
+    Parameters
+    ----------
+    change : numpy.ndarray, shape (n,)
+        Of the readings, when it acts always.
+    states : numpy.ndarray, shape (n, 12)
+        The deviation that it has built up at each reading, in the order of time.
+    on : numpy.ndarray of uint8, shape (n, m)
+        Whether it acts at each reading, in the order of time; m patterns.
+    times, channels, order, cosine, sine, model, process, longest, gain, scale
+        As in :func:`whiten`.
+    out : numpy.ndarray, shape (n, m)
+        Receives the whitened innovations, in the order of time.
+    """
+    count = on.shape[1]
+    z = np.zeros((12, count))
+    force_time, moment_time, drive_time = process[3], process[4], process[5]
+    now = times[order[0]]
+    for k in range(order.size):
+        reading = order[k]
+        left = times[reading] - now
+        while left > 1e-9:
+            dt = min(left, longest)
+            left -= dt
+            fade_f = np.exp(-dt / force_time)
+            fade_m = np.exp(-dt / moment_time)
+            fade_d = np.exp(-dt / drive_time)
+            for j in range(count):
+                _advance(z, j, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+        now = times[reading]
+        channel = int(channels[reading])
+        for j in range(count):
+            if k > 0 and on[k, j] != on[k - 1, j]:
+                sign = 1.0 if on[k, j] else -1.0
+                for i in range(4, 12):
+                    z[i, j] += sign * states[k, i]
+            innovation = (change[reading] if on[k, j] else 0.0) - _read(z, j, channel, model)
+            out[k, j] = innovation / scale[k]
+            for i in range(12):
+                z[i, j] += gain[k, i] * innovation

@@ -1,0 +1,196 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Efforts that are smooth functions of some quantity, at some balance: physics without a name.
+
+An effort is a sum of hat functions of a quantity q, ``f(q) = sum c_k hat_k(q)`` with independent
+Gaussian c_k. With the whitened responses C of the hats (the numbers of the base projected out) and
+what is left e, its log evidence against no effort, at the likeliest size s, is::
+
+    max over s of  b' (G + I/s^2)^-1 b / 2 - ln det(I + s^2 G) / 2,   G = C'C,  b = C'e
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lg_husky_sim.diagnosis.evidence.drives import Channel
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.observation import Motion, probe_times
+from lg_husky_sim.diagnosis.evidence.whitener import respond
+from lg_husky_sim.diagnosis.selection.screening import Projection
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Balances: number of the effort in the deviation model, name of the description, its side,
+#: subsystem, unit.
+BALANCES = {
+    'force': (0, 'smooth_force', 'none', 'translation', 'N'),
+    'moment': (1, 'smooth_moment', 'none', 'rotation', 'N·m'),
+    'torque_left': (2, 'smooth_torque', 'left', 'drivetrain', 'N·m'),
+    'torque_right': (3, 'smooth_torque', 'right', 'drivetrain', 'N·m'),
+}
+#: Quantities that an effort at the chassis and one at the wheels may be a function of.
+CHASSIS = ('forward', 'yaw', 'acceleration', 'heading', 'x', 'y', 'time')
+WHEELS = ('wheel_rate', 'angle', 'wheel_acceleration', 'time')
+#: Those that a description of the catalogue knows, so that a model can hold them.
+WRITABLE = ('forward', 'yaw', 'heading', 'x', 'y', 'time', 'wheel_rate', 'angle')
+
+
+@dataclass(frozen=True, eq=False)
+class Effort:
+    """
+    A smooth effort as the data have it.
+
+    Parameters
+    ----------
+    balance : str
+        Key of :data:`BALANCES`.
+    argument : str
+        Quantity that it is a function of.
+    evidence : float
+        Log evidence against no effort [nats].
+    low, high : float
+        Range of the quantity [its unit].
+    values, deviations : numpy.ndarray, shape (n_knots,)
+        At evenly spaced knots over the range [unit of the balance].
+    """
+
+    balance: str
+    argument: str
+    evidence: float
+    low: float
+    high: float
+    values: FloatArray
+    deviations: FloatArray
+
+    @property
+    def subsystem(self) -> str:
+        """Part of the robot that the balance belongs to."""
+        return BALANCES[self.balance][3]
+
+
+def quantities(evidence: Evidence, motions: Sequence[Motion]) -> list[dict[str, FloatArray]]:
+    """
+    Return what an effort may be a function of, at the probe times of each drive.
+
+    Headings and places are the measured ones where there are any.
+    """
+    found = []
+    before = 0.0
+    for drive, motion in zip(evidence.drives, motions, strict=True):
+        times = probe_times(drive)
+        forward, yaw = motion.column('forward', 'probe'), motion.column('yaw_rate', 'probe')
+        one = {'forward': forward, 'yaw': yaw, 'acceleration': np.gradient(forward, times),
+               'heading': np.mod(motion.column('heading', 'probe'), 2.0 * np.pi),
+               'x': motion.column('x', 'probe'), 'y': motion.column('y', 'probe'),
+               'time': before + times - drive.start}
+        before += drive.end - drive.start
+        if drive.pose_times.size:
+            one['heading'] = np.mod(np.interp(times, drive.pose_times, drive.heading),
+                                    2.0 * np.pi)
+            for name, channel in (('x', Channel.X), ('y', Channel.Y)):
+                one[name] = np.interp(times, drive.pose_times,
+                                      drive.measured[drive.slice_of(channel)])
+        for side in ('left', 'right'):
+            rate = motion.column(f'wheel_{side}', 'probe')
+            one[f'wheel_rate_{side}'] = rate
+            one[f'wheel_acceleration_{side}'] = np.gradient(rate, times)
+            one[f'angle_{side}'] = np.mod(motion.column(f'angle_{side}', 'probe'), 2.0 * np.pi)
+        found.append(one)
+    return found
+
+
+def hats(values: FloatArray, low: float, high: float, count: int) -> FloatArray:
+    """Return the hat functions of values over a range, shape (n, count)."""
+    place = np.clip((values - low) / max(high - low, 1e-12) * (count - 1), 0.0, count - 1.0)
+    left = np.minimum(place.astype(np.int64), count - 2)
+    share = place - left
+    found = np.zeros((values.size, count))
+    rows = np.arange(values.size)
+    found[rows, left] = 1.0 - share
+    found[rows, left + 1] = share
+    return found
+
+
+def log_evidence(columns: FloatArray, target: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """
+    Return the log evidence of columns with Gaussian coefficients of the likeliest size.
+
+    Parameters
+    ----------
+    columns : numpy.ndarray, shape (n, k)
+    target : numpy.ndarray, shape (n,)
+
+    Returns
+    -------
+    float
+        [nats]
+    numpy.ndarray, shape (k,)
+        Coefficients.
+    numpy.ndarray, shape (k,)
+        Their standard deviations.
+    """
+    gram, slope = columns.T @ columns, columns.T @ target
+    values, vectors = np.linalg.eigh(gram)
+    values = np.maximum(values, 0.0)
+    turned = vectors.T @ slope
+    largest = float(values[-1]) if values.size else 0.0
+    if largest <= 0.0:
+        return 0.0, np.zeros(slope.size), np.zeros(slope.size)
+    best, size = 0.0, 1e-3 / largest
+    for power in np.linspace(-3.0, 8.0, 45):
+        square = 10.0 ** power / largest
+        gain = 0.5 * float(np.sum(turned ** 2 / (values + 1.0 / square))
+                           - np.sum(np.log1p(square * values)))
+        if gain > best:
+            best, size = gain, square
+    spread = 1.0 / (values + 1.0 / size)
+    return best, vectors @ (turned * spread), np.sqrt((vectors ** 2) @ spread)
+
+
+def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
+    """
+    Look for smooth efforts in what a fit leaves.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    fit : Fit
+
+    Returns
+    -------
+    tuple of Effort
+        Largest evidence first.
+    """
+    motions = evidence.motions(fit.point, True)
+    known = quantities(evidence, motions)
+    projection = Projection(fit)
+    count = int(setting('smooth_knots'))
+
+    def one_of(task: tuple[str, str]) -> Effort:
+        balance, argument = task
+        row = BALANCES[balance][0]
+        side = BALANCES[balance][2]
+        name = argument if side == 'none' or argument == 'time' else f'{argument}_{side}'
+        pooled = np.concatenate([one[name] for one in known])
+        low, high = (0.0, 2.0 * np.pi) if argument in ('heading', 'angle') else (
+            float(np.min(pooled)), float(np.max(pooled)))
+        parts = []
+        for drive, one, whitener in zip(evidence.drives, known, evidence.whiteners, strict=True):
+            shape = hats(one[name], low, high, count)
+            pushed = np.zeros((shape.shape[0], 4, count))
+            pushed[:, row] = shape
+            frame = whitener.frame
+            out = np.empty((frame.times.size, count))
+            respond(pushed, probe_times(drive), frame.times, drive.channels, frame.order,
+                    frame.cosine, frame.sine, whitener.model, setting('longest_step'), out)
+            parts.append(whitener.apply(out))
+        gain, values, deviations = log_evidence(
+            projection.apply(np.concatenate(parts)), projection.target)
+        return Effort(balance, argument, gain, low, high, values, deviations)
+    tasks = [(b, a) for b in BALANCES for a in (
+        CHASSIS if BALANCES[b][2] == 'none' else WHEELS)]
+    return tuple(sorted(evidence.pool.map(one_of, tasks), key=lambda e: -e.evidence))

@@ -1,0 +1,208 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects that begin at a time or a place: where, by the likelihood on either side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.frames import Frame
+from lg_husky_sim.diagnosis.evidence.observation import Motion, observe, probe_times
+from lg_husky_sim.diagnosis.evidence.whitener import STATES
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, Numbers
+from lg_husky_sim.diagnosis.selection.screening import begin, Look, Projection
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.husky.effects import Onset, OnsetKind
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Effects that add states cannot begin late.
+_ALWAYS_ON = ('belt_compliance', 'speed_loop')
+
+
+def onsets_of(evidence: Evidence) -> list[Onset]:
+    """Return where an effect may begin, on a coarse grid of times and places."""
+    found = []
+    spacing, edge = setting('onset_spacing'), setting('onset_edge')
+    names = list(evidence.names)
+    last = {d.recording: d.end for d in evidence.drives}
+    for drive in evidence.drives:
+        first = drive.start + (edge if names.index(drive.recording) == 0 else 0.0)
+        times = np.arange(first, drive.end - edge, spacing)
+        found += [Onset(OnsetKind.TIME, float(t), drive.recording) for t in times
+                  if t < last[drive.recording]]
+    x = np.concatenate([d.measured[d.slice_of(Channel.X)] for d in evidence.drives])
+    if x.size:
+        low, high = np.quantile(x, [0.0, 1.0])
+        count = int(np.clip((high - low) / setting('place_spacing'), 0, setting('most_places')))
+        for value in np.linspace(low, high, count + 2)[1:-1]:
+            share = float(np.mean(x >= value))
+            if min(share, 1.0 - share) > setting('least_share'):
+                found += [Onset(OnsetKind.PLACE_ABOVE, float(value)),
+                          Onset(OnsetKind.PLACE_BELOW, float(value))]
+    return found
+
+
+def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
+                seen: Sequence[Look]) -> list[Look]:
+    """
+    Look at every effect with an onset.
+
+    One simulation of an effect that acts always serves for all onsets: see
+    :func:`lg_husky_sim.diagnosis.evidence.whitener.whiten_switched`.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    base : Fit
+    pool : sequence of Hypothesis
+    seen : sequence of Look
+        Without an onset, best first.
+
+    Returns
+    -------
+    list of Look
+        The best onset of each.
+    """
+    if base.point.structure.onset is not None:
+        return []
+    known = {one.hypothesis.label: one.numbers for one in seen}
+    onsets = onsets_of(evidence)
+    projection = Projection(base)
+    motions = evidence.motions(base.point, True)
+    patterns = [_patterns(evidence, d, motion, w.frame.times[w.frame.order], onsets)
+                for d, motion, w in zip(evidence.drives, motions, evidence.whiteners,
+                                        strict=True)]
+
+    def best_of(hypothesis: Hypothesis) -> Look | None:
+        groups = hypothesis.trials()
+        if hypothesis.label in known and len(groups) > 1:
+            groups = [[{**groups[0][0], **known[hypothesis.label]}]]
+        best: Look | None = None
+        for group in groups:
+            columns = _columns(evidence, base, motions, patterns, hypothesis, group)
+            if columns is None:
+                continue
+            left = projection.apply(columns)
+            for place, onset in enumerate(onsets):
+                own = left[:, place::len(onsets)]
+                gain, coefficients = projection.gain(own)
+                if gain > (0.0 if best is None else best.gain):
+                    at = hypothesis.at(onset)
+                    best = Look(at, begin(at, group, coefficients), gain, own)
+        return best
+    open_ones = [h for h in pool if h.effect.id not in _ALWAYS_ON and h.effect.shape != 'grip']
+    return [one for one in evidence.pool.map(best_of, open_ones) if one is not None]
+
+
+def _patterns(evidence: Evidence, drive: Drive, motion: Motion, times: FloatArray,
+              onsets: Sequence[Onset]) -> np.typing.NDArray[np.uint8]:
+    # Whether an effect acts at each reading, one column an onset.
+    names = list(evidence.names)
+    at = names.index(drive.recording)
+    place = (np.interp(times, drive.pose_times, drive.measured[drive.slice_of(Channel.X)])
+             if drive.pose_times.size else
+             np.interp(times, probe_times(drive), motion.column('x', 'probe')))
+    found = np.zeros((times.size, len(onsets)), dtype=np.uint8)
+    for k, onset in enumerate(onsets):
+        match onset.kind:
+            case OnsetKind.TIME:
+                own = names.index(onset.recording)
+                found[:, k] = at > own if at != own else times >= onset.value
+            case OnsetKind.PLACE_ABOVE:
+                found[:, k] = place >= onset.value
+            case OnsetKind.PLACE_BELOW:
+                found[:, k] = place <= onset.value
+    return found
+
+
+def _columns(evidence: Evidence, base: Fit, motions: Sequence[Motion],
+             patterns: Sequence[np.typing.NDArray[np.uint8]], hypothesis: Hypothesis,
+             group: Sequence[Numbers]) -> FloatArray | None:
+    # Whitened changes, shape (n, numbers * onsets).
+    found = []
+    for numbers in group:
+        try:
+            point = hypothesis.at(None).point(base.point, numbers)
+            moved = evidence.motions(point, True)
+        except LgHuskyError:
+            return None
+        parts = []
+        for drive, motion, before, whitener, on, old in zip(
+                evidence.drives, moved, motions, evidence.whiteners, patterns, base.predicted,
+                strict=True):
+            change = observe(motion, drive, point.log) - old
+            if not np.all(np.isfinite(change)):
+                return None
+            parts.append(whitener.switched(change, _built_up(
+                drive, motion, before, change, whitener.frame), on))
+        found.append(np.concatenate(parts))
+    return np.hstack(found)
+
+
+def _built_up(drive: Drive, motion: Motion, before: Motion, change: FloatArray, frame: Frame
+              ) -> FloatArray:
+    # Deviation states at each reading: velocities, heading, place, angles.
+    times = frame.times[frame.order]
+    states = np.zeros((times.size, STATES))
+    grid = probe_times(drive)
+    for state, name in ((4, 'forward'), (5, 'yaw_rate'), (7, 'heading'), (10, 'angle_left'),
+                        (11, 'angle_right')):
+        difference = motion.column(name, 'probe') - before.column(name, 'probe')
+        states[:, state] = np.interp(times, grid, difference)
+    if drive.pose_times.size and np.any(states[:, 4]):
+        for state, channel in ((8, Channel.X), (9, Channel.Y)):
+            part = drive.slice_of(channel)
+            states[:, state] = np.interp(times, drive.times[part], change[part])
+    return states
+
+
+def refined(evidence: Evidence, base: Fit, tried: Any, attempt: Callable[..., Any],
+            numbers: Callable[..., Any]) -> Any:
+    """
+    Move an onset to where the cost is least.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    base : Fit
+    tried : Tried
+        With an onset of the coarse grid.
+    attempt, numbers : callable
+        Fit a hypothesis; numbers of a fitted one.
+
+    Returns
+    -------
+    Tried
+    """
+    onset = tried.hypothesis.onset
+    is_time = onset.kind is OnsetKind.TIME
+    step = 0.5 * (setting('onset_spacing') if is_time else setting('place_spacing'))
+    least = setting('onset_time_step') if is_time else setting('onset_place_step')
+    point, best = tried.fit.point, tried.fit.cost
+    value = onset.value
+    limits = [(d.start, d.end) for d in evidence.drives if d.recording == onset.recording]
+
+    def cost(at: float) -> float:
+        if is_time and limits and not limits[0][0] <= at <= limits[-1][1]:
+            return np.inf
+        moved = tried.hypothesis.at(Onset(onset.kind, at, onset.recording))
+        there = moved.point(base.point, numbers(tried)).at(point.places)
+        return evidence.cost(evidence.residuals(evidence.predict(there)), there)
+    while step > least:
+        options = [(cost(value + s * step), value + s * step) for s in (-1.0, 1.0)]
+        found, place = min(options)
+        if found < best:
+            best, value = found, place
+        else:
+            step *= 0.5
+    if value == onset.value:
+        return tried
+    moved = tried.hypothesis.at(Onset(onset.kind, value, onset.recording))
+    again = attempt(evidence, base, moved, [(base.point, numbers(tried)), (
+        base.point.at(point.places[:base.point.places.size]), numbers(tried))])
+    return again if again is not None and again.gain > tried.gain else tried

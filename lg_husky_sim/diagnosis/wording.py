@@ -1,0 +1,48 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Sentences of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from lg_husky_sim.diagnosis.result import Estimate
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+
+_STREAMS = {'wheels': 'of the wheels (joint states)', 'imu': 'of the IMU',
+            'pose': 'of the pose (tf or odometry)'}
+
+
+def onset_words(onset: Onset | None) -> str:
+    """Return an onset in words, with a leading comma; empty without one."""
+    if onset is None:
+        return ''
+    if onset.kind is OnsetKind.TIME:
+        where = f' of {onset.recording}' if onset.recording else ' of each recording'
+        return f', from {onset.value:.1f} s{where} on'
+    side = 'above' if onset.kind is OnsetKind.PLACE_ABOVE else 'below'
+    return f', where x is {side} {onset.value:.2f} m'
+
+
+def in_words(numbers: Sequence[Estimate]) -> str:
+    """Return estimates as text with their intervals."""
+    return ', '.join(
+        f'{e.name.replace("_", " ")} {e.value:.3g}{"" if e.unit == "1" else " " + e.unit} '
+        f'({e.low:.3g} to {e.high:.3g})' for e in numbers)
+
+
+def effect_words(effect: Effect) -> str:
+    """Return what an effect is and where, in words."""
+    side = '' if effect.side in ('none', '') else {
+        'both': ' (both sides)', 'left': ' (left side)', 'right': ' (right side)'}[effect.side]
+    if effect.id == 'sensor_time_offset':
+        return f'the stamps {_STREAMS[effect.shape]} are late'
+    return f'{effect.kind.title}{side}'
+
+
+def sentence(effect: Effect, onset: Onset | None, numbers: Sequence[Estimate], regime: str,
+             changed: bool = False) -> str:
+    """Return a finding in one plain sentence with numbers."""
+    text = (f'{"this has changed: " if changed else ""}{effect_words(effect)}'
+            f'{onset_words(onset)}: {in_words(numbers)}. It shows {regime}.')
+    return text[0].upper() + text[1:]
