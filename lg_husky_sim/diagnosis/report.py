@@ -92,7 +92,8 @@ def size_words(one: Estimate) -> str:
     return f'{one.name.replace("_", " ")} {number(one.value)}{unit}{interval}'
 
 
-def headline(diagnosis: Diagnosis, warnings: Sequence[str] = ()) -> Headline:
+def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: bool = False
+             ) -> Headline:
     """
     Return the answer in thirty seconds.
 
@@ -101,6 +102,8 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = ()) -> Headline:
     diagnosis : Diagnosis
     warnings : sequence of str
         What speaks against it.
+    changed : bool
+        Whether the question was what changed between recordings.
 
     Returns
     -------
@@ -110,20 +113,23 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = ()) -> Headline:
     sentences = tuple(one.statement for one in found)
     match diagnosis.verdict:
         case Verdict.NOTHING_MISSING:
-            return Headline('No missing physics found', Tone.GOOD, (sure,),
-                            ('The recalibrated model explains the recordings.',),
-                            tuple(warnings))
+            text = 'No change found' if changed else 'No missing physics found'
+            words = ('The robot of the earlier recordings explains the later ones.' if changed
+                     else 'The recalibrated model explains the recordings.')
+            return Headline(text, Tone.GOOD, (sure,), (words,), tuple(warnings))
         case Verdict.UNKNOWN:
             parts = ', '.join(dict.fromkeys(one.subsystem for one in found))
-            return Headline('Something is missing that is none of the known effects', Tone.BAD,
+            text = 'Something has changed' if changed else 'Something is missing'
+            return Headline(f'{text} that is none of the known effects', Tone.BAD,
                             (('Effect', 'none of the catalogue'),
                              ('Part of the robot', parts or '–'), sure),
                             sentences, tuple(warnings))
         case Verdict.KNOWN:
             what = '; '.join(effect_words(one) for one in found)
-            noun = 'effect' if len(found) == 1 else 'effects'
+            noun = 'What changed' if changed else (
+                'Missing effect found' if len(found) == 1 else 'Missing effects found')
             facts = tuple(fact for one in found for fact in _facts(one, len(found) > 1))
-            return Headline(f'Missing {noun} found: {what}', Tone.FOUND, (*facts, sure),
+            return Headline(f'{noun}: {what}', Tone.FOUND, (*facts, sure),
                             sentences, tuple(warnings))
 
 
@@ -270,7 +276,7 @@ def report_data(
     diagnosis: Diagnosis, recordings: Sequence[str], traces: Sequence[Trace],
     errors: Sequence[ErrorTable], parameters: Sequence[ParameterRow] = (), *,
     shapes: Mapping[tuple[str, str], str] | None = None, sections: Sequence[Section] = (),
-    view: View | None = None, provenance: Provenance | None = None,
+    view: View | None = None, provenance: Provenance | None = None, changed: bool = False,
 ) -> ReportData:
     """
     Return all of a diagnosis' report.
@@ -292,6 +298,8 @@ def report_data(
     view : View, optional
         What is shown first; the signal in which the finding helps most if not given.
     provenance : Provenance, optional
+    changed : bool
+        Whether the question was what changed between recordings.
 
     Returns
     -------
@@ -310,7 +318,7 @@ def report_data(
                                  if diagnosis.remaining else ()))
     return ReportData(
         f'Diagnosis of {", ".join(recordings)}',
-        headline(diagnosis, (*losses(errors), *implausible(parameters))), columns,
+        headline(diagnosis, (*losses(errors), *implausible(parameters)), changed=changed), columns,
         tuple((name, about[name]) for name in columns), tuple(traces), tuple(errors),
         advice(diagnosis, shapes or {}), view,
         tuple(Mismatch(m.recording, _SIGNALS.get(m.channel, m.channel), m.start,

@@ -188,9 +188,11 @@
   }
 
   function show(start, end) {
-    state.range = start === null ? null : { start, end };
+    const own = data.traces.filter((one) => one.r === state.recording).map((one) => one.t);
+    state.range = { start: Math.max(start, Math.min(...own.map((t) => t[0]))),
+      end: Math.min(end, Math.max(...own.map((t) => t[t.length - 1]))) };
     drawSignals();
-    if (start !== null) $('explorer').scrollIntoView({ behavior: 'smooth' });
+    $('explorer').scrollIntoView({ behavior: 'smooth' });
   }
   function choose(recording) {
     state.recording = recording;

@@ -70,7 +70,8 @@ def change_report(case: ChangeCase, provenance: Provenance | None = None) -> Rep
                    for table in recording_tables(parts, columns, pair)]
     data = report_data(
         diagnosis, list(dict.fromkeys(s.recording for s in case.segments)),
-        traces_of(parts, columns), tables, sections=(_both_fits(case),), provenance=provenance)
+        traces_of(parts, columns), tables, sections=(_both_fits(case),), provenance=provenance,
+        changed=True)
     return replace(data, about=tuple((name, _ABOUT[name]) for name in columns))
 
 

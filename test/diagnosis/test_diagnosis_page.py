@@ -1,0 +1,99 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A diagnosis answers in its first lines: what, where, how much, how sure, and what to do."""
+
+from __future__ import annotations
+
+import math
+
+from lg_husky_sim.diagnosis.report import advice, headline, implausible, losses, sizes
+from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.reporting.data import (
+    ErrorRow,
+    ErrorTable,
+    ParameterRow,
+    RECALIBRATED,
+    WITH_FINDING,
+)
+from lg_husky_sim.reporting.sections import Tone
+import pytest
+
+
+def _finding(effect: str, side: str, *numbers: Estimate) -> Finding:
+    return Finding(effect, side, 'drivetrain', ('J_LW',), 'while driving', None, numbers, 800.0,
+                   1e-9, 0.9, (), 'A sentence.')
+
+
+def _diagnosis(verdict: Verdict, *findings: Finding) -> Diagnosis:
+    model = load_model()
+    return Diagnosis(verdict, 0.93, findings, (), (), (), {}, {}, {}, {}, '', model, model)
+
+
+RIPPLE = _finding('torque_ripple', 'left', Estimate('ripple_cos', 3.0, 'N·m', 2.8, 3.2),
+                  Estimate('ripple_sin', -4.0, 'N·m', -4.2, -3.8))
+
+
+def test_a_ripple_has_amplitude_and_phase() -> None:
+    amplitude, phase = sizes(RIPPLE)
+    assert (amplitude.name, amplitude.value, amplitude.unit) == ('amplitude', 5.0, 'N·m')
+    assert (amplitude.low, amplitude.high) == pytest.approx((4.8, 5.2))
+    assert phase.value == pytest.approx(math.atan2(-4.0, 3.0))
+    assert phase.high - phase.low == pytest.approx(2 * 0.2 / 5.0)
+
+
+def test_the_first_line_names_effect_and_side() -> None:
+    said = headline(_diagnosis(Verdict.KNOWN, RIPPLE))
+    assert said.text == 'Missing effect found: torque ripple, left side'
+    assert dict(said.facts) == {
+        'Effect': 'torque ripple', 'Side': 'left', 'Size': 'amplitude 5 N·m (4.8 to 5.2)',
+        'Acts': 'always', 'Confidence': '93 %'}
+
+
+@pytest.mark.parametrize(('verdict', 'changed', 'text', 'tone'), [
+    (Verdict.NOTHING_MISSING, False, 'No missing physics found', Tone.GOOD),
+    (Verdict.NOTHING_MISSING, True, 'No change found', Tone.GOOD),
+    (Verdict.UNKNOWN, False, 'Something is missing that is none of the known effects', Tone.BAD),
+    (Verdict.UNKNOWN, True, 'Something has changed that is none of the known effects', Tone.BAD),
+    (Verdict.KNOWN, True, 'What changed: torque ripple, left side', Tone.FOUND)])
+def test_the_first_line_answers_the_question(verdict: Verdict, changed: bool, text: str,
+                                             tone: Tone) -> None:
+    found = () if verdict is Verdict.NOTHING_MISSING else (RIPPLE,)
+    said = headline(_diagnosis(verdict, *found), changed=changed)
+    assert (said.text, said.tone) == (text, tone)
+
+
+def test_advice_has_the_numbers_and_the_stream() -> None:
+    late = _finding('sensor_time_offset', 'none', Estimate('stamp_delay', 0.206, 's', 0.2, 0.21))
+    robot, simulator = advice(_diagnosis(Verdict.KNOWN, RIPPLE, late), {
+        ('sensor_time_offset', 'none'): 'pose'})
+    assert 'the left wheels' in robot.sentences[0]
+    assert '5 N·m' in robot.sentences[0]
+    assert any('The stamps of the pose' in line and '0.206 s' in line for line in robot.sentences)
+    assert 'model:=model.yaml' in simulator.sentences[-1]
+
+
+def test_a_limit_on_the_speed_says_nothing_of_the_yaw_rate() -> None:
+    limit = _finding('command_limit', 'none', Estimate('limit_forward', 0.45, 'm/s', 0.44, 0.46))
+    _, simulator = advice(_diagnosis(Verdict.KNOWN, limit), {})
+    assert simulator.sentences[0] == 'Set `max_forward: 0.45` [m/s] in sim_node.'
+    assert not any('max_yaw' in line for line in simulator.sentences)
+
+
+def test_what_gets_worse_on_held_out_data_is_said_first() -> None:
+    rows = (ErrorRow('position [m]', {RECALIBRATED: 0.05, WITH_FINDING: 0.1}),
+            ErrorRow('yaw rate [rad/s]', {RECALIBRATED: 0.2, WITH_FINDING: 0.1}))
+    columns = (RECALIBRATED, WITH_FINDING)
+    (warning,) = losses([ErrorTable('held out', rows, columns, True, columns)])
+    assert 'position +100\u00a0%' in warning
+    assert 'yaw rate' not in warning
+    assert losses([ErrorTable('all', rows, columns, False, columns)]) == ()
+
+
+def test_parameters_at_their_bounds_are_called_implausible() -> None:
+    rows = [ParameterRow('wheel_damping', 'N·m·s/rad', 1.0, 2.0, at_bound=True),
+            ParameterRow('mass', 'kg', 48.0, 50.0)]
+    (warning,) = implausible(rows)
+    assert warning.startswith(
+        '1 of 2 recalibrated parameters is at its bound (wheel damping): the recalibration is not')
+    assert implausible(rows[1:]) == ()
