@@ -62,6 +62,8 @@ class Block:
         Those that this block shows, by gain, the largest first.
     others : tuple of Candidate
         In the loop: the changes of the body, with all that differs.
+    anything : float
+        Log evidence of everything being different over that of no change [nats].
     """
 
     base: Base
@@ -70,6 +72,7 @@ class Block:
     noise: Noise
     candidates: tuple[Candidate, ...]
     others: tuple[Candidate, ...]
+    anything: float
 
 
 def compare(base: Base, before: Sequence[Drive], after: Sequence[Drive], begin: FloatArray,
@@ -94,7 +97,7 @@ def compare(base: Base, before: Sequence[Drive], after: Sequence[Drive], begin: 
     numbers = base.settings.fit
     quantities = base.settings.quantities
     free = np.array([not base.given or q.name in base.settings.body for q in quantities])
-    prior = Prior(base.start, np.array([q.sd for q in quantities]), free)
+    prior = Prior(base.start, base.sd, free)
     steps, enough = int(numbers['steps']), numbers['enough']
     noise = first_noise(base.settings)
     earlier = fit_set(base, before, prior, noise, begin, steps, numbers['roughly'], pool).z
@@ -171,7 +174,7 @@ def _joined(parts: Sequence[Quadratic]) -> list[Quadratic]:
 
 
 def _candidates(base: Base, prior: Prior, quadratics: Sequence[Quadratic]
-                ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
+                ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
     quantities = base.settings.quantities
     index = np.flatnonzero(prior.free)
     place = {quantities[k].name: i for i, k in enumerate(index)}
@@ -196,4 +199,5 @@ def _candidates(base: Base, prior: Prior, quadratics: Sequence[Quadratic]
 
     def ordered(found: Sequence[Candidate]) -> tuple[Candidate, ...]:
         return tuple(sorted(found, key=lambda one: -one.gain))
-    return ordered(own), ordered(others)
+    anything = evidence.solve(np.arange(index.size)).evidence - nothing
+    return ordered(own), ordered(others), anything

@@ -61,12 +61,22 @@ def finding(decision: Decision, settings: Settings, p_value: float, share: float
             ) -> Finding | None:
     """Return what is named as a finding."""
     named = decision.named
+    rivals = tuple(Rivalry(one.change.effect, one.change.side, one.gain)
+                   for one in decision.rivals)
+    if decision.unnamed:
+        near = decision.rivals[0].change if decision.rivals else None
+        return Finding('unknown', 'none', near.subsystem if near else 'drivetrain',
+                       near.elements if near else (), near.regime if near else '', None, (),
+                       decision.unnamed, p_value, share, rivals,
+                       'Something changed that is none of the known changes: the later recordings '
+                       'are fitted by another robot than the earlier ones.')
     if named is None:
         return None
     change = named.change
-    rivals = tuple(Rivalry(one.change.effect, one.change.side, one.gain)
-                   for one in decision.rivals)
-    return Finding(change.effect, change.side, change.subsystem, change.elements, change.regime,
+    sign = next((one.value for one in estimates(named, settings) if one.name == 'gyro_factor'),
+                1.0)
+    effect = 'gyro_sign' if sign < 0.0 else change.effect
+    return Finding(effect, change.side, change.subsystem, change.elements, change.regime,
                    None, estimates(named, settings), named.gain, p_value, share, rivals,
                    statement(named, settings))
 

@@ -26,12 +26,15 @@ class Decision:
     tied : tuple of str
         Names that cannot be told from the one given, itself first; empty where it stands alone.
     confidence : float
+    unnamed : float
+        Gain of letting everything differ where something changed that has no name [nats]; else 0.
     """
 
     named: Candidate | None
     rivals: tuple[Candidate, ...]
     tied: tuple[str, ...]
     confidence: float
+    unnamed: float = 0.0
 
 
 def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], whole: Sequence[Candidate],
@@ -57,7 +60,7 @@ def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], whole: Sequen
     Candidate or None
     """
     first = _settled(body, whole, numbers)
-    other = _simplest(loop, numbers)
+    other = _simplest([one for one in loop if one.gain > one.change.bar], numbers)
     if first is not None and first.gain > numbers['body_claim'] and (
             other is None or other.gain < numbers['loop_share'] * first.gain):
         return first
@@ -108,6 +111,13 @@ def decide(body: Block | None, loop: Block | None, settings: Settings) -> Decisi
     looped = () if loop is None else loop.candidates
     named = named_by(bodily, looped, () if loop is None else loop.others, numbers)
     everything = sorted((*bodily, *looped), key=lambda one: -one.gain)
+    anything = max((block.anything for block in (body, loop) if block is not None), default=0.0)
+    gained = 0.0 if named is None else named.gain
+    if anything > numbers['unknown'] and gained < numbers['unknown_share'] * anything:
+        odds = numbers['sure_offset'] + numbers['sure_gain'] * float(np.log(
+            anything / numbers['claim'])) + numbers['sure_margin'] * (1.0 - gained / anything)
+        return Decision(None, _best_of_names(everything, ''), (), _bounded(odds, numbers),
+                        anything)
     if named is None:
         largest = max((one.gain for one in everything), default=0.0)
         doubt = numbers['sure_doubt'] * float(np.clip(largest / numbers['claim'], 0.0, 2.0))

@@ -91,7 +91,9 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
     before, after = _drives(baseline, known), _drives(recordings, known)
     body = None
     with threads(jobs) as pool:
-        base = base_of(known, nominal.parameters, given=True)
+        intervals = [float(np.median(np.diff(d.wheels.times))) for d in (*before, *after)
+                     if d.wheels.times.size > 1]
+        base = base_of(known, nominal.parameters, True, max(intervals, default=0.0))
         begin = base.start
         if all(_shows_the_body(drive) for drive in (*before, *after)):
             body = compare(base, before, after, begin, pool, lambda share: progress(
@@ -149,7 +151,8 @@ def _diagnosis(decision: Decision, body: Block | None, loop: Block, after: Seque
         half = fitted([plain, new], train, steps, about)
     shown = body if named is not None and named.change.block == 'body' and body else loop
     return Diagnosis(
-        Verdict.NOTHING_MISSING if found is None else Verdict.KNOWN, decision.confidence,
+        Verdict.NOTHING_MISSING if found is None else (
+            Verdict.UNKNOWN if decision.unnamed else Verdict.KNOWN), decision.confidence,
         () if found is None else (found,), not_told_apart(decision, known),
         mismatches(shown, after, decision, known), (),
         _errors(plain, later), _errors(model, later), _errors(plain, test), _errors(half, test),

@@ -32,8 +32,8 @@ class Base:
     Parameters
     ----------
     settings : Settings
-    start : numpy.ndarray, shape (n,)
-        Means of the priors, on the scale of the estimates.
+    start, sd : numpy.ndarray, shape (n,)
+        Means and standard deviations of the priors, on the scale of the estimates.
     fixed : numpy.ndarray
         Numbers that are not estimated.
     given : bool
@@ -42,6 +42,7 @@ class Base:
 
     settings: Settings
     start: FloatArray
+    sd: FloatArray
     fixed: FloatArray
     given: bool = False
 
@@ -64,16 +65,21 @@ class Base:
                 np.array([scaled(q, q.upper) for q in quantities]))
 
 
-def base_of(settings: Settings, nominal: Parameters, given: bool = False) -> Base:
-    """Return the base for the parameters of the model in doubt."""
+def base_of(settings: Settings, nominal: Parameters, given: bool = False,
+            interval: float = 0.0) -> Base:
+    """Return the base for the model in doubt; `interval` is that of the wheel rates [s]."""
     start = [nominal[q.nominal] if q.start is None else q.start for q in settings.quantities]
     logs = [q.logarithmic for q in settings.quantities]
     z = np.array([np.log(x) if log else x for x, log in zip(start, logs, strict=True)])
+    late = [q.name for q in settings.quantities].index('wheels_late')
+    z[late] += 0.5 * interval
+    sd = np.array([q.sd for q in settings.quantities])
+    sd[late] += 0.5 * interval
     numbers = {**settings.simulation,
                'wheelbase': nominal['wheelbase'], 'wheel_radius': nominal['wheel_radius'],
                'motor_resistance': nominal['motor_resistance'],
                'transmission': nominal['torque_constant'] * nominal['gear_ratio']}
-    return Base(settings, z, np.array([numbers[name] for name in FIXED]), given)
+    return Base(settings, z, sd, np.array([numbers[name] for name in FIXED]), given)
 
 
 @dataclass(frozen=True, eq=False)

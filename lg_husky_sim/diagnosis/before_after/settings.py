@@ -64,6 +64,8 @@ class Change:
         body or loop: where it shows.
     parameters : tuple of str
         Names of those that differ.
+    bar : float
+        Least gain that claims it [nats].
     more : tuple of str
         Of those that differ as well, and show in the loop only.
     title, regime : str
@@ -77,6 +79,7 @@ class Change:
     subsystem: str
     block: str
     parameters: tuple[str, ...]
+    bar: float
     more: tuple[str, ...]
     title: str
     regime: str
@@ -154,8 +157,9 @@ def _change(entry: Mapping[str, Any], known: frozenset[str]) -> Change:
         raise DiagnosisError(f'before_after.yaml: change {entry["effect"]}: block = '
                              f'{shown(entry["block"])} is neither body nor loop')
     return Change(entry['effect'], entry['side'], entry['subsystem'], entry['block'],
-                  tuple(entry['parameters']), tuple(entry.get('more', ())), entry['title'],
-                  entry['regime'], tuple(entry['elements']))
+                  tuple(entry['parameters']), _number('bar', entry.get('bar', 0.0)),
+                  tuple(entry.get('more', ())), entry['title'], entry['regime'],
+                  tuple(entry['elements']))
 
 
 def _values(content: Mapping[str, Any], section: str) -> dict[str, float]:
