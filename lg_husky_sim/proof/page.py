@@ -168,7 +168,9 @@ def _gap(rates: Sequence[Json], stated: Json) -> list[str]:
 
 
 def _section(title: str, results: Json, trials: Sequence[Json], full: bool) -> list[str]:
-    parts = [f'## {title}', '', _kinds(results) + '.', '', _facts(trials), '',
+    notes = [text for one in trials for text in (*textwrap.wrap(str(one.get('note', '')), 98), '')
+             if one.get('note')]
+    parts = [f'## {title}', '', _kinds(results) + '.', '', _facts(trials), '', *notes,
              _markdown(_HEAD, _rate_rows(results['rates'])), '']
     parts += _reliability(results['reliability'])
     if full:

@@ -258,7 +258,8 @@ def test_text_and_page_say_the_figures_of_each_set_apart() -> None:
     result = summary.summarise(judgements())
     assert '6 cases: 3 single effects, 1 pairs, 2 clean, 0 outside' in text_of(result)
     facts = {'command': 'lg_husky prove --report', 'commit': 'c0ffee', 'cases': 6, 'planned': 6,
-             'seal': 'ab' * 32, 'seeds': '10000 to 10005', 'set': 'report'}
+             'seal': 'ab' * 32, 'seeds': '10000 to 10005', 'set': 'report',
+             'note': 'Stopped early.'}
     page = page_of({'report': (result, [facts]), 'tuning': (result, [facts])},
                    ['docs/some.jsonl'])
     assert page.count('| single effects: named right | 2 of 3 | 67 % (21 % to 94 %) '
@@ -269,6 +270,7 @@ def test_text_and_page_say_the_figures_of_each_set_apart() -> None:
     assert '| slope | 3 | 2 | 3 | payload 1 |' in page
     assert 'Expected calibration error' in page
     assert 'No set is reported' not in page
+    assert '\nStopped early.\n' in page
     assert 'No set is reported' in page_of({'tuning': (result, [facts])}, ['a'])
 
 
