@@ -44,6 +44,7 @@ def require(module: str, purpose: str) -> None:
 
     """
     if find_spec(module) is None:
-        message = f'{module} is needed to {purpose} and is not installed: ' \
-                  f"pip install 'lg_husky_sim[{EXTRA_OF[module]}]'"
+        # By its own name: no index has this package's extras; in a clone they are '.[extra]'.
+        message = (f'{module} is needed to {purpose} and is not installed: pip install {module}, '
+                   f"or in a clone pip install '.[{EXTRA_OF[module]}]'")
         raise MissingExtraError(message)

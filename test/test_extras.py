@@ -30,7 +30,7 @@ def test_absent_module_names_extra_and_purpose(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr('lg_husky_sim.extras.find_spec', lambda name: None)
     with pytest.raises(MissingExtraError, match=(
             r'^rosbags is needed to read recordings and is not installed: '
-            r"pip install 'lg_husky_sim\[bags\]'$")):
+            r"pip install rosbags, or in a clone pip install '\.\[bags\]'$")):
         require('rosbags', 'read recordings')
 
 

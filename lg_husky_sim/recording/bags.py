@@ -1,17 +1,19 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Bags on disk: opened, listed and read message by message, through `rosbags`."""
+"""Bags on disk: opened, listed and read message by message, by `rosbags` or by ROS itself."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 import tempfile
 from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.errors import LgHuskyError, RecordingError
 from lg_husky_sim.extras import require
+from lg_husky_sim.recording.rosbag2 import available, Rosbag2
 from lg_husky_sim.recording.salvage import is_cut_off, salvage
 from lg_husky_sim.recording.topics import Topic
 
@@ -63,7 +65,7 @@ class Bag:
 
 
 @contextmanager
-def open_bag(path: Path) -> Iterator[Bag]:
+def open_bag(path: Path) -> Iterator[Bag | Rosbag2]:
     """
     Open a bag: a rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag file.
 
@@ -81,16 +83,20 @@ def open_bag(path: Path) -> Iterator[Bag]:
         If it is no bag, or it is damaged; whatever the library raises on damaged bytes while
         the bag is open becomes this error.
     MissingExtraError
-        If `rosbags` is not installed.
+        If neither `rosbags` nor ROS's `rosbag2_py` is installed.
     """
-    require('rosbags', 'read recordings')
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import get_typestore, Stores
-
+    by_ros = find_spec('rosbags') is None and available()
+    if not by_ros:
+        require('rosbags', 'read recordings')
     files = _files(path)
     try:
         with tempfile.TemporaryDirectory(prefix='lg_husky_') as scratch:
             whole, notes = _repaired(files, Path(scratch))
+            if by_ros:
+                yield Rosbag2(whole, notes)
+                return
+            from rosbags.highlevel import AnyReader
+            from rosbags.typesys import get_typestore, Stores
             reader = AnyReader(whole, default_typestore=get_typestore(Stores.ROS2_JAZZY))
             with reader:
                 yield Bag(reader, notes)

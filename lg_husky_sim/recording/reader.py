@@ -24,6 +24,7 @@ from lg_husky_sim.recording.frames import (
 )
 from lg_husky_sim.recording.names import printable
 from lg_husky_sim.recording.recording import CHANNELS, Recording
+from lg_husky_sim.recording.rosbag2 import Rosbag2
 from lg_husky_sim.recording.topics import (
     candidates,
     listing,
@@ -91,7 +92,7 @@ def read_recording(path: str | PathLike[str], topics: TopicMap | None = None) ->
 
 
 def _collect(
-    bag: Bag, present: tuple[Topic, ...], chosen: TopicMap, whose: Robots,
+    bag: Bag | Rosbag2, present: tuple[Topic, ...], chosen: TopicMap, whose: Robots,
 ) -> dict[str, _Found]:
     """Read the likeliest topic of each role; the next one where it gave nothing."""
     waiting = {role: list(candidates(role, present, getattr(chosen, role), whose))
@@ -109,7 +110,7 @@ def _collect(
     return found
 
 
-def _read(bag: Bag, attempt: Mapping[str, Topic]) -> dict[str, Collected]:
+def _read(bag: Bag | Rosbag2, attempt: Mapping[str, Topic]) -> dict[str, Collected]:
     collected = {role: Collected() for role in attempt}
     by_topic: dict[Topic, list[str]] = {}
     for role, topic in attempt.items():

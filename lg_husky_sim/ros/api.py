@@ -23,7 +23,7 @@ if TYPE_CHECKING or not HAVE_RCLPY:
     if find_spec('cyclonedds') is None:
         raise MissingExtraError(
             'neither rclpy nor cyclonedds is installed: source a ROS 2 setup file, or '
-            "pip install 'lg_husky_sim[dds,bags]'")
+            'pip install cyclonedds rosbags')
     from lg_husky_sim.ros.embedded.clock import Duration, Time
     from lg_husky_sim.ros.embedded.context import (
         ExternalShutdownException,

@@ -49,6 +49,7 @@ def drive(tool: Tool, manoeuvre: Manoeuvre, settings: Settings, *, wait: float =
     """
     with Commands(tool, settings) as commands:
         commands.wait(wait, say)
+        tool.wait_for_time(wait)
         script = manoeuvre.commands()
         start = tool.now()
         for moment, (forward, yaw) in zip(script.times.tolist(), script.values.tolist(),

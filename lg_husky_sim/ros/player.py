@@ -106,6 +106,7 @@ def play(tool: Tool, streams: Mapping[str, TimeSeries], settings: Settings, *,
             if time.monotonic() > end:
                 raise RecordingError(f'nobody listens to any of the topics after {wait:g} s')
         _say_who(commands, senders, told, say)
+        tool.wait_for_time(wait)
         times = np.concatenate([streams[name].times for name in names])
         which = np.repeat(np.arange(len(names)), [len(streams[name]) for name in names])
         rows = np.concatenate([np.arange(len(streams[name])) for name in names])

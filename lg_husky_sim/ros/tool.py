@@ -107,6 +107,23 @@ class Tool:
             return float(self.node.get_clock().now().nanoseconds) * 1e-9
         return time.monotonic()
 
+    def wait_for_time(self, seconds: float) -> None:
+        """
+        Wait until simulated time is known: what is paced from zero on would come all at once.
+
+        Raises
+        ------
+        CommandError
+            If nobody publishes /clock.
+
+        """
+        end = time.monotonic() + seconds
+        while self.simulated and self.now() == 0.0:
+            self.serve()
+            if time.monotonic() > end:
+                raise CommandError(f'use_sim_time is set and nothing came on /clock for '
+                                   f'{seconds:g} s')
+
     def serve(self) -> None:
         """
         Serve what is ready, waiting for a short while.

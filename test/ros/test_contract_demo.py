@@ -35,10 +35,12 @@ def test_a_driven_recording_can_be_read_and_summed_up(
     tool = Tool('lg_husky_driver', Orderly())
     assert drive(tool, SHORT, settings, progress=seen.append) == len(SHORT.commands())
     tool.close()
+    # Nobody served the recorder meanwhile; it has a backlog.
+    assert probe.until(lambda: recorder.counts[f'/{settings.command_topic}'] == len(
+        SHORT.commands()) + ZEROS)
     probe.spin(0.5)
     assert husky.node.stop() == 0
     recorder.close()
-    assert recorder.counts[f'/{settings.command_topic}'] == len(SHORT.commands()) + ZEROS
     assert seen == sorted(seen)
     recording = read_recording(tmp_path / 'bag')
     command = recording.streams['command']

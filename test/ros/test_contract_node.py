@@ -109,7 +109,7 @@ def test_a_long_request_of_steps_can_be_interrupted(probe: Probe, made: list[Sim
     before = time.monotonic()
     node.advance(1_000_000, told.append)
     probe.spin(0.3)
-    assert node.engine.total > 300
+    assert node.engine.total > 20
     assert told == []
     pause.publish(boolean(data=True))
     assert probe.until(lambda: told == [False])
@@ -165,7 +165,7 @@ def test_parameters_of_others_are_left_alone(probe: Probe, made: list[SimNode]) 
     node = add(probe, made, 'guest', '/guest', robot_description='<robot/>', spede=2.0,
                **{'qos_overrides./tf.publisher.depth': 3})
     assert node.settings.speed == 1.0
-    assert probe.until(lambda: len([m for m in log if m.name == 'guest.guest']) > 6)
+    assert probe.until(lambda: any(m.msg.startswith('parameter spede') for m in log))
     texts = [m.msg for m in log]
     assert 'parameter spede is unknown; did you mean speed?; it is ignored' in texts
     assert any(text.startswith('qos_overrides have no effect') for text in texts)
@@ -185,11 +185,10 @@ def test_several_robots_in_one_process(probe: Probe, made: list[SimNode]) -> Non
     right = probe.listen('nav_msgs/msg/Odometry', '/right/ground_truth', 500)
     one, two = add(probe, made, 'sim', '/left'), add(probe, made, 'sim', '/right')
     one.engine.command(BodyTwist(0.5, 0.0))
-    probe.spin(0.8)
+    assert probe.until(lambda: min(len(left), len(right)) > 30)
     assert left[-1].pose.pose.position.x > 0.05
     assert right[-1].pose.pose.position.x == 0.0
     assert abs(one.engine.total - two.engine.total) < 60
-    assert min(len(left), len(right)) > 30
     two.engine.configure(two.settings)
     assert one.engine.state is not two.engine.state
 

@@ -48,7 +48,7 @@ def store() -> Typestore:
         from rosbags.typesys import get_typestore, Stores
     except ModuleNotFoundError as error:
         raise MissingExtraError(
-            "ROS messages without ROS need rosbags: pip install 'lg_husky_sim[bags,dds]'"
+            'ROS messages without ROS need rosbags: pip install cyclonedds rosbags'
         ) from error
     types = get_typestore(Stores.ROS2_JAZZY)
     # rosidl reads the message language's char as uint8; the store hashes it as a char of IDL.
