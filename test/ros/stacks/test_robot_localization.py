@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from importlib.util import find_spec
 import math
 import os
@@ -44,10 +45,10 @@ def ekf_node() -> Path | None:
     """Return the filter's program, or None where it is not installed."""
     if find_spec('rclpy') is None or find_spec('ament_index_python') is None:
         return None
-    from ament_index_python.packages import get_package_prefix, PackageNotFoundError
+    packages = import_module('ament_index_python.packages')
     try:
-        prefix = get_package_prefix('robot_localization')
-    except PackageNotFoundError:
+        prefix = packages.get_package_prefix('robot_localization')
+    except packages.PackageNotFoundError:
         return None
     return Path(prefix) / 'lib' / 'robot_localization' / 'ekf_node'
 
