@@ -36,10 +36,13 @@ EXTRAS = {
 EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report', 'search')
                  for need in EXTRAS[extra]]
 EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale'], *EXTRAS['tables']]
-EXTRAS['test'] = ['hypothesis>=6.100', 'pytest>=8', 'pytest-rerunfailures>=16.7',
-                  'pytest-xdist>=3.5', 'setuptools>=70.1']
+EXTRAS['test'] = ['hypothesis>=6.100', 'ipykernel>=6', 'nbclient>=0.10', 'nbformat>=5.9',
+                  'pytest>=8', 'pytest-rerunfailures>=16.7', 'pytest-xdist>=3.5',
+                  'setuptools>=70.1']
+EXTRAS['docs'] = ['mkdocs-material~=9.8', 'mkdocstrings[python]>=0.27']
 EXTRAS['dev'] = [
     *EXTRAS['test'],
+    *EXTRAS['docs'],
     # Linters are held at one version each: a newer one may find what was fine yesterday.
     'flake8~=7.5.0',
     'flake8-builtins~=3.1.0',

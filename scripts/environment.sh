@@ -6,6 +6,8 @@
 #
 #   LG_HUSKY_VENV    folder of the environment (default: .venv here, .venv-<distro> with ROS)
 #   LG_HUSKY_PYTHON  interpreter to make it with (default: python3, else python3.12, python3.11)
+#   LG_HUSKY_LOCKED  1: exactly the versions of requirements.lock
+#   LG_HUSKY_UV      0: pip even where uv is installed (uv is faster; pip is the fallback)
 
 : "${root:?}"
 
@@ -50,6 +52,7 @@ sudo apt install python3 python3-venv"
 stamp_of() {
     # What the installed environment depends on; a change of any of it installs again.
     { printf '%s\n' "$1" "$root" "${ROS_DISTRO:-no ROS}"
+      [ "${LG_HUSKY_LOCKED:-0}" = 1 ] && cat "$root/requirements.lock"
       cat "$root/setup.py" "$root/setup.cfg" "$root/pyproject.toml" "$root/package.xml"; } |
         sha256sum | cut -d ' ' -f 1
 }
@@ -70,6 +73,20 @@ show_progress() {
              /^Installing collected/ { print "  installing them" }
              { fflush() }' >&2
     fi
+}
+
+has_uv() {
+    [ "${LG_HUSKY_UV:-1}" != 0 ] && command -v uv >/dev/null
+}
+
+install_with_uv() {
+    # install_with_uv LOG: true if uv installed everything; what it lacks, pip may still reach.
+    local code
+    uv pip install --quiet --python "$venv/bin/python" "${constraints[@]}" \
+        --editable "${root}[${extra}]" >"$1" 2>&1
+    code=$?
+    [ "$code" -eq 0 ] || echo "  uv could not install it (see $1): trying pip" >&2
+    return "$code"
 }
 
 install_project() {
@@ -106,6 +123,9 @@ make_environment() {
         # ROS messages are compiled for the system's numpy 1.
         constraints=(--constraint "$root/scripts/ros_constraints.txt")
     fi
+    if [ "${LG_HUSKY_LOCKED:-0}" = 1 ]; then
+        constraints+=(--constraint "$root/requirements.lock")
+    fi
     # An environment of a clone that has moved, or of a Python that has gone, is made anew.
     if [ -e "$venv" ] && { ! "$venv/bin/python" -c '' 2>/dev/null ||
             ! head -n 1 "$venv/bin/pip" 2>/dev/null | grep -qF "$venv/bin/python"; }; then
@@ -118,12 +138,15 @@ not of our making; remove it, or name another folder in LG_HUSKY_VENV"
             fail "$python has no venv module; on Debian or Ubuntu: sudo apt install python3-venv"
         echo "setting up $venv with $("$python" -V 2>&1) (once; a few minutes, some 950 MB)" >&2
         mkdir -p "$venv" && touch "$venv/.lg_husky_made"
-        "$python" -m venv "${options[@]}" "$venv" || fail "could not make $venv"
+        # pip comes along with uv too: what is added later by hand needs it.
+        { has_uv && uv venv --quiet --seed --allow-existing --python "$python" "${options[@]}" \
+            "$venv" 2>/dev/null; } ||
+            "$python" -m venv "${options[@]}" "$venv" || fail "could not make $venv"
     else
         echo "updating $venv" >&2
     fi
     log=$venv/install.log
-    install_project "$log" || install_project "$log.offline" --no-index --no-build-isolation || {
+    { has_uv && install_with_uv "$log.uv"; } || install_project "$log" || install_project "$log.offline" --no-index --no-build-isolation || {
         grep '^ERROR' "$log" | tail -n 3 >&2
         if grep -qiE 'NewConnectionError|name resolution|Network is unreachable|Connection (refused|timed out|reset)|ReadTimeout|ProxyError|Name or service not known|Max retries' "$log"; then
             fail "there is no network to install from: connect, or set LG_HUSKY_VENV to an \

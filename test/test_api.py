@@ -188,6 +188,16 @@ def test_the_model_that_drove_explains_its_recording(drive: Path) -> None:
     assert yaw['true'] < 0.2 * yaw['paper']
 
 
+def test_simulated_drives_stand_beside_each_other_without_a_file() -> None:
+    husky = lg.Husky()
+    bend, spin = husky.simulate('s_bend'), husky.simulate('spin')
+    again = husky.simulate('s_bend')
+    names = [one.recording.name for one in lg.compare([bend, spin, again]).outcomes]
+    assert names == ['s_bend', 'spin', 's_bend 2']
+    with pytest.raises(RecordingError, match='s_bend is given twice'):
+        lg.compare([bend, bend])
+
+
 def test_models_get_names_of_their_own(drive: Path, tmp_path: Path) -> None:
     path = lg.Husky(mass=60.0).save(tmp_path / 'heavy.yaml')
     assert lg.compare(drive, [lg.Husky(), path]).labels == ('paper', 'heavy')

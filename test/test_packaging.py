@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -93,6 +94,40 @@ def test_installed_package_finds_its_own_files_away_from_the_source(
     found = Path(done.stdout.strip())
     assert found == site / 'lg_husky_sim' / 'config' / 'husky.yaml'
     assert found.read_bytes() == (ROOT / 'config' / 'husky.yaml').read_bytes()
+
+
+def test_the_wheel_simulates_reads_and_compares_away_from_the_source(
+        wheel: Path, tmp_path: Path) -> None:
+    site = tmp_path / 'site'
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+    ask = ('import sys; sys.path.insert(0, sys.argv[1])\n'
+           'import lg_husky_sim as lg\n'
+           'assert lg.__file__.startswith(sys.argv[1])\n'
+           'bag = lg.Husky().simulate("straight").save("bag")\n'
+           'page = lg.compare(lg.read(bag)).save("out", figures=1)\n'
+           'print(lg.read(bag).info().verdict, page)')
+    done = subprocess.run([sys.executable, '-P', '-c', ask, str(site)], cwd=tmp_path, text=True,
+                          capture_output=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.startswith('Not enough for diagnose.')  # nine seconds straight ahead
+    assert (tmp_path / 'out' / 'index.html').is_file()
+
+
+def test_versions_agree() -> None:
+    version = arguments_of_setup()['version']
+    citation = (ROOT / 'CITATION.cff').read_text(encoding='utf-8')
+    assert f'\nversion: {version}\n' in citation
+
+
+def test_the_lock_file_names_packages_and_no_place() -> None:
+    lines = (ROOT / 'requirements.lock').read_text(encoding='utf-8').splitlines()
+    pins = [line for line in lines if not line.startswith('#')]
+    assert len(pins) > 50
+    for line in pins:
+        assert re.fullmatch(r'[a-z0-9-]+==[0-9][\w.+!]*', line), line
+    locked = {line.partition('==')[0] for line in pins}
+    assert {'numpy', 'scipy', 'sympy', 'rosbags', 'rich', 'pandas'} <= locked
 
 
 def arguments_of_setup(folder: Path = ROOT) -> dict[str, object]:

@@ -27,20 +27,24 @@ def named_apart(*groups: Sequence[Recording]) -> tuple[tuple[Recording, ...], ..
     -------
     tuple of tuple of Recording
         The groups; in front of names that are not enough stand the folders that make them
-        differ, as in ``before/drive``.
+        differ, as in ``before/drive``; those that never lay in a file get a number behind.
 
     Raises
     ------
     RecordingError
         If a recording is given twice.
     """
-    places = [os.path.realpath(recording.path) for group in groups for recording in group]
+    everything = [recording for group in groups for recording in group]
+    places = [os.path.realpath(recording.path) for recording in everything if recording.path]
     for place in places:
         if places.count(place) > 1:
             raise RecordingError(f'recording {place} is given twice')
+    for recording in everything:
+        if sum(recording is other for other in everything) > 1:
+            raise RecordingError(f'recording {recording.name} is given twice')
     taken: set[str] = set()
     found = []
-    for group in groups:
+    for group in _numbered(groups):
         names = _apart(group, taken)
         taken.update(names)
         found.append(tuple(
@@ -78,6 +82,20 @@ def printable(text: str) -> str:
     return text.encode('utf-8', 'replace').decode()
 
 
+def _numbered(groups: Sequence[Sequence[Recording]]) -> list[list[Recording]]:
+    # What was simulated has no folder that could tell it from its namesakes.
+    seen: dict[str, int] = {}
+    found: list[list[Recording]] = []
+    for group in groups:
+        found.append([])
+        for recording in group:
+            count = 0 if recording.path else seen.get(recording.name, 0) + 1
+            seen[recording.name] = max(count, seen.get(recording.name, 0))
+            found[-1].append(recording if count < 2 else replace(
+                recording, name=f'{recording.name} {count}'))
+    return found
+
+
 def _apart(group: Sequence[Recording], taken: set[str]) -> list[str]:
     # Each with as few folders as tell it from the others and from what is taken.
     ladders = [_ladder(recording) for recording in group]
@@ -91,6 +109,8 @@ def _apart(group: Sequence[Recording], taken: set[str]) -> list[str]:
 def _ladder(recording: Recording) -> list[str]:
     # The name alone, then with more and more of the folders in which the recording lies; the
     # last is where it really lies, which no two share.
+    if not recording.path:
+        return [recording.name]
     place = PurePath(os.path.realpath(recording.path))
     folders = place.parent.parts[1:]
     return [recording.name,
