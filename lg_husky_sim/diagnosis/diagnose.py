@@ -26,6 +26,7 @@ from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts
 from lg_husky_sim.diagnosis.localisation import mismatches
 from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
@@ -163,15 +164,16 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
            ) -> tuple[str, ...]:
     notes = []
     worse = [name for name in plain if name in augmented
-             and augmented[name] > 1.05 * plain[name]] if found.found else []
+             and augmented[name] > (1.0 + setting('worse')) * plain[name]] if found.found else []
     if worse:
         notes.append('predictions of data that were not fitted get worse with what was found: '
                      + ', '.join(f'{name} {plain[name]:.3g} to {augmented[name]:.3g}'
                                  for name in worse))
+    most = setting('strained')
     strained = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.strain,
-                                       strict=True) if abs(s) > 3.0 and u.kind == 'model']
+                                       strict=True) if abs(s) > most and u.kind == 'model']
     if strained:
-        notes.append('more than three tolerances from nominal: ' + ', '.join(strained)
+        notes.append(f'more than {most:g} tolerances from nominal: ' + ', '.join(strained)
                      + '; check whether this model fits this robot')
     values = found.evidence.noise.values
     notes.append(f'floor and drivetrains disturb with {values["force"]:.2g} N, '

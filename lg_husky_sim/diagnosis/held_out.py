@@ -12,13 +12,15 @@ from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.diagnosis.evidence.drives import drive_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.selection.search import Search
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.recording import Segment, windows
 
-#: Longest stretch that is driven without a new start [s].
-LONGEST = 60.0
-#: Shortest segment that is split into a fitted and a held-out half [s].
-SPLIT = 8.0
+
+def stretches_of(segment: Segment) -> tuple[Segment, ...]:
+    """Return a segment, cut where it is too long to be driven without a new start."""
+    longest = setting('longest_stretch')
+    return tuple(windows(segment, longest)) if segment.duration > 1.5 * longest else (segment,)
 
 
 def errors(plant: Plant, segments: Sequence[Segment]) -> dict[str, float]:
@@ -39,8 +41,7 @@ def errors(plant: Plant, segments: Sequence[Segment]) -> dict[str, float]:
     parts: list[Mapping[str, SquareSum]] = []
     bounds: list[tuple[float, float]] = []
     for segment in segments:
-        stretches = windows(segment, LONGEST) if segment.duration > 1.5 * LONGEST else (segment,)
-        for stretch in stretches:
+        for stretch in stretches_of(segment):
             prediction = replay(plant, stretch)
             parts.append(channel_errors(stretch, prediction))
             if 'pose' in stretch.streams:
@@ -78,7 +79,7 @@ def split(segments: Sequence[Segment]) -> tuple[tuple[Segment, ...], tuple[Segme
                 tuple(s for s in segments if s.recording not in kept))
     first, second = [], []
     for segment in segments:
-        if segment.duration < SPLIT:
+        if segment.duration < setting('shortest_split'):
             first.append(segment)
             continue
         middle = 0.5 * (segment.start + segment.end)

@@ -60,7 +60,7 @@ def summary_text(diagnosis: Diagnosis) -> str:
     lines = [f'{headline(diagnosis)} (confidence {diagnosis.confidence:.2f})']
     for finding in diagnosis.findings:
         lines.append(f'  {finding.effect}: {finding.statement}')
-        evidence = f'held-out gain {finding.held_out_gain:.0f} nats, {finding.chance}; ' if (
+        evidence = f'gain {finding.held_out_gain:.0f} nats, {finding.chance}; ' if (
             finding.chance) else ''
         rivals = [f'{r.effect} {r.held_out_gain:.0f}' for r in finding.rivals
                   if r.held_out_gain > 0.0]

@@ -9,6 +9,7 @@ import math
 
 from lg_husky_sim.diagnosis.before_after.settings import settings as before_after
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import effect_kind, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.data import (
@@ -28,8 +29,6 @@ from lg_husky_sim.reporting.data import (
 from lg_husky_sim.reporting.sections import Cell, Section, Table, Tone
 from lg_husky_sim.reporting.words import capitalised, change, number, plural
 
-#: A held-out error that grows by more than this share is said before anything else.
-LOSS = 0.05
 _STREAMS = {'wheels': 'the wheels (`/joint_states`)', 'imu': 'the IMU',
             'pose': 'the pose (`/tf`, odometry)'}
 _WHEELS = {'left': 'the left wheels', 'right': 'the right wheels'}
@@ -162,7 +161,7 @@ def losses(tables: Sequence[ErrorTable]) -> tuple[str, ...]:
             continue
         for row in table.rows:
             before, after = (row.values.get(name, math.nan) for name in table.compared)
-            if after > before * (1.0 + LOSS):
+            if after > before * (1.0 + setting('worse')):
                 worse.append(f'{row.name.split(" [")[0]} {change(before, after)}')
     return () if not worse else (
         'On data that were not fitted, the model with the finding predicts worse than the '
@@ -243,14 +242,14 @@ def competing(diagnosis: Diagnosis) -> tuple[Section, ...]:
             side = one.side if one.side in ('left', 'right') else ''
             rows.append((', '.join(part for part in (one.effect.replace('_', ' '), side) if part),
                          Cell(number(one.held_out_gain), max(one.held_out_gain, 0.0) / top)))
-        tables.append(Table(('effect', 'held-out gain [nats]'), tuple(rows)))
+        tables.append(Table(('effect', 'gain [nats]'), tuple(rows)))
         near = max(finding.rivals, key=lambda r: r.held_out_gain)
         share = near.held_out_gain / finding.held_out_gain if finding.held_out_gain > 0.0 else 0.0
         if share > 0.0:
             text.append(f'Next to {effect_words(finding)} comes '
                         f'{near.effect.replace("_", " ")} with {100.0 * share:.0f} % of its gain.')
-    text.append('The held-out gain is the logarithm of how many times more probable data that '
-                'were not fitted are with the effect than without (1 nat: 2.7 times).')
+    text.append('The gain is the logarithm of how many times more probable the recordings are '
+                'with the effect than without, everything else fitted again (1 nat: 2.7 times).')
     return (Section('Competing effects', tuple(text), tables=tuple(tables)),) if tables else ()
 
 
@@ -265,7 +264,7 @@ def found_numbers(diagnosis: Diagnosis) -> tuple[Section, ...]:
             finding.elements) else ''
         points.append(f'{capitalised(effect_words(finding))} ({finding.subsystem}): shows '
                       f'{finding.regime or "everywhere"}; acts {onset_words(finding.onset)}. '
-                      f'{place}Held-out gain {number(finding.held_out_gain)} nats'
+                      f'{place}Gain {number(finding.held_out_gain)} nats'
                       f'{"; " + finding.chance if finding.chance else ""}.')
     tables = (Table(('effect', 'parameter', 'estimate', '95 % interval', 'unit'), tuple(rows)),)
     return (Section('The finding in numbers', points=tuple(points),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
 from lg_husky_sim.diagnosis.diagnose import Case
-from lg_husky_sim.diagnosis.held_out import errors, LONGEST, split
+from lg_husky_sim.diagnosis.held_out import errors, split, stretches_of
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES
 from lg_husky_sim.diagnosis.localisation import Missing, missing_efforts, strengths
 from lg_husky_sim.diagnosis.planning import named_drive
@@ -23,7 +23,7 @@ from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.linear_graph import Branch, LinearGraph
-from lg_husky_sim.recording import Segment, windows
+from lg_husky_sim.recording import Segment
 from lg_husky_sim.reporting.data import (
     ErrorRow,
     ErrorTable,
@@ -108,11 +108,7 @@ def _plant(model: ModelFile) -> Plant:
 
 def _stretches(segments: Sequence[Segment]) -> list[Segment]:
     # No longer than the errors of a diagnosis are taken over, each from its measured start.
-    found: list[Segment] = []
-    for segment in segments:
-        long = segment.duration > 1.5 * LONGEST
-        found += windows(segment, LONGEST) if long else (segment,)
-    return found
+    return [stretch for segment in segments for stretch in stretches_of(segment)]
 
 
 def _held_out(case: Case, columns: Sequence[str]) -> list[ErrorTable]:

@@ -50,7 +50,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Rivalry:
-    """A rival of a finding with its held-out gain [nats]."""
+    """A rival of a finding with its gain in log posterior [nats]."""
 
     effect: str
     side: str
@@ -76,12 +76,12 @@ class Finding:
     onset : Onset or None
     parameters : tuple of Estimate
     held_out_gain : float
-        On blocks that were not fitted [nats].
+        Gain in log posterior on all data under one noise [nats].
     p_value : float
-        Of the drop of the sum of squares, corrected for the number of hypotheses; not a number
-        where the finding is not one of such a drop.
+        Of the largest gain on a robot that lacks nothing, corrected for the number of hypotheses;
+        not a number where the finding has no such chance.
     share : float
-        Share of the unexplained energy that it explains.
+        Share of the gains of all findings.
     rivals : tuple of Rivalry
     statement : str
         One plain sentence with numbers.

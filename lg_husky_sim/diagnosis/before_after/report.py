@@ -9,12 +9,11 @@ from dataclasses import replace
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
 from lg_husky_sim.diagnosis.before_after.diagnose_change import ChangeCase
-from lg_husky_sim.diagnosis.held_out import errors, LONGEST, split
+from lg_husky_sim.diagnosis.held_out import errors, split, stretches_of
 from lg_husky_sim.diagnosis.report import report_data
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.recording import Segment, windows
 from lg_husky_sim.reporting.data import (
     ErrorRow,
     ErrorTable,
@@ -53,7 +52,7 @@ def change_report(case: ChangeCase, provenance: Provenance | None = None) -> Rep
     columns = tuple(plants)
     parts: list[Predicted] = [
         (stretch, {label: replay(plant, stretch) for label, plant in plants.items()})
-        for segment in case.segments for stretch in _stretches(segment)]
+        for segment in case.segments for stretch in stretches_of(segment)]
     pair = (columns[-2], columns[-1])
     _, test = split(case.segments)
     known = {NOMINAL: errors(plants[NOMINAL], test), RECALIBRATED: diagnosis.held_out_plain,
@@ -77,11 +76,6 @@ def change_report(case: ChangeCase, provenance: Provenance | None = None) -> Rep
 
 def _plant(model: ModelFile) -> Plant:
     return compile_model(model.structure).at(model.parameters)
-
-
-def _stretches(segment: Segment) -> tuple[Segment, ...]:
-    long = segment.duration > 1.5 * LONGEST
-    return windows(segment, LONGEST) if long else (segment,)
 
 
 def _both_fits(case: ChangeCase) -> Section:

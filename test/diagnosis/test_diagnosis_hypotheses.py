@@ -1,0 +1,94 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What may be missing, and when a gain is beyond chance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+import itertools
+
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
+from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Point
+from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, neutral_of
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import Recording
+import numpy as np
+import pytest
+
+ALL = hypotheses(load_model().structure)
+#: Those that do nothing at some allowed numbers, on a robot whose tyres have no limit to change.
+NEUTRAL = [h for h in ALL if h.effect.shape != 'grip' and all(
+    (at := neutral_of(p)) is not None and p.lower <= at <= p.upper for p in h.free)]
+
+
+@pytest.fixture(scope='module')
+def setup(drive: Callable[..., Recording]) -> Iterator[tuple[Evidence, Point]]:
+    """Return the evidence of one drive and the nominal point."""
+    drives, model = drives_of([drive('ahead', 'nothing', 1)]), load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with ThreadPoolExecutor(1) as pool:
+        yield evidence_of(drives, ['ahead'], start, first_guess(drives), pool), start
+
+
+def test_larger_gains_are_less_likely_by_chance(setup: tuple[Evidence, Point]) -> None:
+    chances = [chance_of(gain, ALL[0], 60, setup[0]) for gain in np.linspace(-5.0, 60.0, 40)]
+    assert chances[0] == 1.0
+    assert all(b <= a for a, b in itertools.pairwise(chances))
+    assert not is_beyond_chance(chances[0])
+    assert is_beyond_chance(chances[-1])
+
+
+def test_more_tries_and_an_onset_make_a_gain_likelier_by_chance(
+        setup: tuple[Evidence, Point]) -> None:
+    evidence, one = setup[0], ALL[0]
+    late = one.at(Onset(OnsetKind.TIME, 8.0, 'ahead'))
+    few, many = chance_of(15.0, one, 10, evidence), chance_of(15.0, one, 100, evidence)
+    assert few < many < chance_of(15.0, late, 100, evidence) < 1.0
+
+
+@pytest.mark.parametrize('taken', ['slope', 'gyro_scale', 'command_slew', 'coulomb_drivetrain'])
+def test_an_effect_that_shares_a_number_with_one_that_is_there_is_not_offered(
+        taken: str) -> None:
+    own = next(h.effect for h in ALL if h.effect.id == taken)
+    names = {p.name for p in own.parameters()}
+    offered = hypotheses(load_model().structure.with_effect(own))
+    assert offered
+    for other in offered:
+        assert not names & {p.name for p in other.effect.parameters()}, other.label
+    clashing = {h.label for h in ALL if names & {p.name for p in h.effect.parameters()}}
+    assert {h.label for h in ALL} - {h.label for h in offered} == clashing
+
+
+def test_every_effect_of_the_catalogue_is_offered_to_a_plain_model() -> None:
+    assert len({h.label for h in ALL}) == len(ALL)
+    assert {'slope', 'gyro_scale', 'payload'} <= {h.effect.id for h in ALL}
+    assert Effect('coulomb_drivetrain', 'left') in [h.effect for h in ALL]
+
+
+def small(hypothesis: Hypothesis) -> dict[str, float]:
+    """Return numbers that do nothing; next to nothing where the scale is logarithmic."""
+    found = {}
+    for p in hypothesis.free:
+        neutral = neutral_of(p)
+        assert neutral is not None
+        found[p.name] = neutral if neutral != 0.0 or p.lower < 0.0 else 1e-4 * p.starts[0]
+    return found
+
+
+@pytest.mark.parametrize('hypothesis', NEUTRAL, ids=lambda h: str(h.label))
+def test_an_effect_at_its_neutral_numbers_predicts_what_the_base_predicts(
+        hypothesis: Hypothesis, setup: tuple[Evidence, Point]) -> None:
+    evidence, base = setup
+    point = hypothesis.point(base, small(hypothesis))
+    plain, other = evidence.predict(base)[0], evidence.predict(point)[0]
+    # The loosest limit of acceleration that the catalogue allows rounds a step by a little.
+    part = 0.004 if hypothesis.effect.id == 'command_slew' else 0.001
+    off = float(np.sqrt(np.mean((plain - other) ** 2)))
+    assert off < part * float(np.std(evidence.drives[0].measured))

@@ -1,0 +1,73 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the numbers and the names of a diagnosis stand: in configuration, not in code."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+import re
+from typing import Any
+
+from lg_husky_sim.diagnosis.evidence.noise import NAMES
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import catalogue
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / 'lg_husky_sim'
+DIAGNOSIS = {path.relative_to(PACKAGE / 'diagnosis').as_posix(): path.read_text()
+             for path in sorted((PACKAGE / 'diagnosis').rglob('*.py'))
+             if 'before_after' not in path.parts}
+CODE = '\n'.join(path.read_text() for path in sorted(PACKAGE.rglob('*.py')))
+SETTINGS: dict[str, Any] = yaml.safe_load((ROOT / 'config' / 'diagnosis.yaml').read_text())
+ENTRIES = {name: entry for section, entries in SETTINGS.items() if section != 'schema'
+           for name, entry in entries.items()}
+#: Sizes of arrays, layouts and identities: no physics and no statistics.
+LAYOUT = {'STATES', 'BALANCES', 'NEUTRAL', 'LEAST_CHANCE'}
+#: Who may name an effect, and which; wording and what a person should drive are free to.
+NAMED = {
+    'conclusion.py': {'yaw_pull'},
+    'selection/onsets.py': {'belt_compliance', 'speed_loop'},
+    'wording.py': {'sensor_time_offset'},
+    'separation.py': set(catalogue()),
+}
+
+
+@pytest.mark.parametrize('name', ENTRIES)
+def test_every_number_has_a_value_a_unit_and_a_meaning(name: str) -> None:
+    entry = ENTRIES[name]
+    assert isinstance(entry['value'], int | float)
+    assert entry['unit']
+    assert len(entry['meaning']) > 5
+    assert setting(name) == entry['value']
+
+
+@pytest.mark.parametrize('name', ENTRIES)
+def test_every_number_is_used_somewhere(name: str) -> None:
+    prefix, _, rest = name.partition('_')
+    by_noise = f"setting(f'{prefix}_{{" in CODE and rest in NAMES
+    assert re.search(rf"'{name}'", CODE) or by_noise
+
+
+def test_no_two_numbers_have_one_name() -> None:
+    assert len(ENTRIES) == sum(len(v) for k, v in SETTINGS.items() if k != 'schema')
+
+
+@pytest.mark.parametrize('module', DIAGNOSIS)
+def test_no_number_stands_at_the_head_of_a_module(module: str) -> None:
+    for node in ast.parse(DIAGNOSIS[module]).body:
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+            numbers = [c.value for c in ast.walk(node.value) if isinstance(c, ast.Constant)
+                       and isinstance(c.value, int | float) and not isinstance(c.value, bool)]
+            assert not numbers or ast.unparse(target) in LAYOUT, ast.unparse(node)
+
+
+@pytest.mark.parametrize('module', DIAGNOSIS)
+def test_only_listed_modules_name_an_effect(module: str) -> None:
+    named = {c.value for c in ast.walk(ast.parse(DIAGNOSIS[module]))
+             if isinstance(c, ast.Constant) and isinstance(c.value, str)
+             and c.value in catalogue()}
+    assert named <= NAMED.get(module, set())
