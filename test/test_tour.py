@@ -55,7 +55,7 @@ def test_tour_shows_every_offline_step(toured: tuple[Path, str]) -> None:
 
 def test_tour_finds_what_was_hidden_and_the_fit_improves(toured: tuple[Path, str]) -> None:
     folder, _ = toured
-    hidden = json.loads((folder / 'trial/answers/case_0001.json').read_text('utf-8'))['effects']
+    hidden = json.loads((folder / 'trial/answers/case_0001.json').read_text('utf-8'))['answers']
     found = json.loads((folder / 'found/diagnosis.json').read_text('utf-8'))
     assert found['verdict'] == 'known'
     assert [finding['effect'] for finding in found['findings']] == [
