@@ -180,10 +180,16 @@ def answer(search: Search, rest: Sequence[Effort]) -> Answer:
     others = [t.gain for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id]
     second = max([0.0, *others])
     features = confidence.Features(best.gain, 1.0 - second / max(best.gain, 1e-9),
-                                   left / max(best.gain, 1e-9), first.chance)
+                                   left / max(_explained(search), 1e-9), first.chance)
     if left > setting('unknown_evidence') and features.share > setting('unknown_share'):
         return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
     return Answer(Verdict.KNOWN, confidence.of_name(features), features)
+
+
+def _explained(search: Search) -> float:
+    # What the adopted effects gain under the noise that remains with them.
+    evidence, plain = search.evidence, search.plain
+    return evidence.cost(evidence.residuals(plain.predicted), plain.point) - search.final.cost
 
 
 def unknown_finding(search: Search, rest: Sequence[Effort]) -> Finding:

@@ -150,6 +150,12 @@ def smoothed(times: FloatArray, values: FloatArray, width: float) -> FloatArray:
     return np.asarray(solveh_banded(bands, values), dtype=np.float64)
 
 
+def _derived(rates: TimeSeries, angles: TimeSeries) -> bool:
+    # Rates that reading made of the angles, in the middle between their stamps: no measurement.
+    middles = 0.5 * (angles.times[:-1] + angles.times[1:])
+    return len(rates) > 3 and bool(np.mean(np.isin(rates.times, middles)) > 0.5)
+
+
 def _early(series: TimeSeries, start: float, names: Sequence[str]) -> list[float]:
     part = series.slice(start, start + setting('start_window'))
     values = part if len(part) else series
@@ -177,7 +183,7 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
     start = segment.start
     wheels, imu, pose = (streams.get(n) for n in ('wheels', 'imu', 'pose'))
     angles = streams.get('wheel_angles')
-    counted = wheels is None and angles is not None
+    counted = angles is not None and (wheels is None or _derived(wheels, angles))
     turning = angles if counted else wheels
     pieces: list[tuple[Channel, FloatArray, FloatArray]] = []
     rates: tuple[float, float] | None = None

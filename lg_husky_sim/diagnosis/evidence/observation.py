@@ -41,6 +41,9 @@ class Reading:
     Parameters
     ----------
     wheels : WheelReading
+    imu : float or None
+        Where in the window of its mean a yaw rate is stamped: 0 at the end, 1 at the begin; None
+        for a rate of the moment.
     values : mapping of str to float
         ``wheel_window`` [s] (length of the window, or time constant of the low pass),
         ``delay_wheels``, ``delay_imu``, ``delay_pose`` [s] (how late stamps are),
@@ -50,6 +53,7 @@ class Reading:
     """
 
     wheels: WheelReading = WheelReading.WINDOW_END
+    imu: float | None = None
     values: Mapping[str, float] = field(default_factory=dict)
 
     def get(self, name: str) -> float:
@@ -140,8 +144,13 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
         ends = wheels + {WheelReading.WINDOW_END: 0.0, WheelReading.WINDOW_MIDDLE: 0.5,
                          WheelReading.WINDOW_START: 1.0}[reading.wheels] * window
         begins = ends - window
+    imu_begins = imu[:0]
+    if reading.imu is not None and imu.size > 3:
+        period = float(np.median(np.diff(imu)))
+        imu = imu + reading.imu * period
+        imu_begins = imu - period
     groups = {'wheels': ends, 'begins': begins, 'imu': imu, 'pose': pose,
-              'probe': probe_times(drive) if probe else ends[:0]}
+              'imu_begins': imu_begins, 'probe': probe_times(drive) if probe else ends[:0]}
     parts, place = {}, 0
     for name, times in groups.items():
         parts[name] = slice(place, place + times.size)
@@ -177,8 +186,8 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
     delays = (sensors.delay_wheels + reading.get('delay_wheels'),
               sensors.delay_imu + reading.get('delay_imu'),
               sensors.delay_pose + reading.get('delay_pose'))
-    key = (reading.wheels, reading.get('wheel_window'), reading.get('command_delay'), delays,
-           probe)
+    key = (reading.wheels, reading.imu, reading.get('wheel_window'),
+           reading.get('command_delay'), delays, probe)
     wanted = drive.remembered(key, lambda: _wanted(drive, reading, delays, probe))
     propagator = Propagator(plant)
     events = wanted.events
@@ -211,6 +220,18 @@ def _rate(motion: Motion, drive: Drive, side: str, reading: Reading, late: float
         return found
     turned = (motion.column(f'angle_{side}', 'wheels') - motion.column(f'angle_{side}', 'begins'))
     return np.asarray(turned / motion.wanted.spans, dtype=np.float64)
+
+
+def _yaw_rate(motion: Motion) -> FloatArray:
+    # Of the moment, or the mean over a window.
+    parts = motion.wanted.parts
+    if parts['imu_begins'].start == parts['imu_begins'].stop:
+        return motion.column('yaw_rate', 'imu')
+    turned = motion.column('heading', 'imu') - motion.column('heading', 'imu_begins')
+    span = motion.times[parts['imu']] - motion.times[parts['imu_begins']]
+    found: FloatArray = np.where(span > 1e-6, turned / np.maximum(span, 1e-6),
+                                 motion.column('yaw_rate', 'imu'))
+    return found
 
 
 def wheel_lag(reading: Reading) -> float:
@@ -268,8 +289,8 @@ def _observed(motion: Motion, drive: Drive, reading: Reading, sensors: SensorMod
                     sensors.delay_wheels + reading.get('delay_wheels'))
     if drive.imu_times.size:
         out[drive.slice_of(Channel.YAW_RATE)] = (
-            sensors.gyro_factor * (1.0 + reading.get('gyro_gain')) * motion.column(
-                'yaw_rate', 'imu') + sensors.gyro_bias + reading.get('gyro_offset'))
+            sensors.gyro_factor * (1.0 + reading.get('gyro_gain')) * _yaw_rate(motion)
+            + sensors.gyro_bias + reading.get('gyro_offset'))
     if drive.pose_times.size:
         out[drive.slice_of(Channel.HEADING)] = motion.column('heading', 'pose')
         x, y = _places(drive, motion.column('distance', 'pose'), reading)

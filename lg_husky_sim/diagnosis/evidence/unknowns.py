@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Drive
@@ -131,6 +131,35 @@ def base_unknowns(parameters: Parameters, drives: Sequence[Drive]) -> tuple[Unkn
         add('delay_pose', offset)
         add('pose_turn', setting('pose_turn'))
         add('pose_lever', setting('pose_lever'))
+    return tuple(found)
+
+
+def loosened(unknowns: Sequence[Unknown], jitter: Mapping[str, float]) -> tuple[Unknown, ...]:
+    """
+    Return unknowns whose delays may be as large as the jitter of their stamps suggests.
+
+    A base that looks for commands at its own rate 1/T is late by T/2 on the mean and by T/sqrt(12)
+    more or less; a stamp that is given late now and then is so likewise.
+
+    Parameters
+    ----------
+    unknowns : sequence of Unknown
+    jitter : mapping of str to float
+        Standard deviation [s] of what each delay varies by.
+
+    Returns
+    -------
+    tuple of Unknown
+    """
+    found = []
+    for one in unknowns:
+        if one.kind == 'log' and one.name in jitter:
+            own = setting('transport_spread' if one.name == 'command_delay' else 'stamp_offset')
+            deviation = math.hypot(own, setting('late_by_jitter') * jitter[one.name])
+            reach = setting('log_reach') * deviation
+            one = replace(one, deviation=deviation, lower=one.centre - reach,
+                          upper=one.centre + reach, step=0.2 * own)
+        found.append(one)
     return tuple(found)
 
 

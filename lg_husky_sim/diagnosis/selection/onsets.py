@@ -13,7 +13,7 @@ from lg_husky_sim.diagnosis.evidence.frames import Frame
 from lg_husky_sim.diagnosis.evidence.observation import Motion, observe, probe_times
 from lg_husky_sim.diagnosis.evidence.whitener import STATES
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, Numbers
-from lg_husky_sim.diagnosis.selection.screening import begin, Look, Projection
+from lg_husky_sim.diagnosis.selection.screening import begin, in_proportion, Look, Projection
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Onset, OnsetKind
@@ -88,9 +88,10 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
             if columns is None:
                 continue
             left = projection.apply(columns)
+            flags = in_proportion(hypothesis, group)
             for place, onset in enumerate(onsets):
                 own = left[:, place::len(onsets)]
-                gain, coefficients = projection.gain(own)
+                gain, coefficients = projection.gain(own, flags)
                 if gain > (0.0 if best is None else best.gain):
                     at = hypothesis.at(onset)
                     best = Look(at, begin(at, group, coefficients), gain, own)

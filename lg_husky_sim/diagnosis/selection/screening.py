@@ -14,7 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, neutral_of, Numbers
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
+    Hypothesis,
+    neutral_of,
+    Numbers,
+    proportional,
+)
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.signals import FloatArray
@@ -70,8 +75,17 @@ class Projection:
         left: FloatArray = stacked - self._base @ (self._base.T @ stacked)
         return left
 
-    def gain(self, left: FloatArray) -> tuple[float, FloatArray]:
-        """Return the gain of projected columns [nats] and their coefficients."""
+    def gain(self, left: FloatArray, free: Sequence[bool]) -> tuple[float, FloatArray]:
+        """
+        Return the gain of projected columns [nats] and their coefficients.
+
+        Parameters
+        ----------
+        left : numpy.ndarray, shape (n, m)
+        free : sequence of bool
+            Whether a coefficient may have any value; others stay near the size that was
+            simulated, since such numbers do not act in proportion.
+        """
         normal = left.T @ left
         slope = left.T @ self.target
         size = np.sqrt(np.diag(normal))
@@ -79,7 +93,10 @@ class Projection:
             return 0.0, np.zeros(left.shape[1])
         scaled = normal / np.outer(size, size) + 1e-9 * np.eye(size.size)
         coefficients = np.linalg.solve(scaled, slope / size) / size
-        return 0.5 * float(coefficients @ slope), coefficients
+        low, high = setting('least_factor'), setting('most_factor')
+        kept = np.where(np.asarray(free, dtype=np.bool_), coefficients,
+                        np.clip(coefficients, low, high))
+        return float(kept @ slope - 0.5 * kept @ normal @ kept), kept
 
 
 def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]:
@@ -119,11 +136,17 @@ def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]
         stacked = [np.column_stack([c[d] for c in columns if c is not None])
                    for d in range(len(evidence.drives))]
         left = projection.apply(evidence.whiten(stacked))
-        gain, coefficients = projection.gain(left)
+        gain, coefficients = projection.gain(left, in_proportion(hypothesis, group))
         if hypothesis.label not in best or gain > best[hypothesis.label].gain:
             best[hypothesis.label] = Look(
                 hypothesis, begin(hypothesis, group, coefficients), gain, left)
     return sorted(best.values(), key=lambda one: -one.gain)
+
+
+def in_proportion(hypothesis: Hypothesis, group: Sequence[Numbers]) -> list[bool]:
+    """Return for each column of a group whether its number acts in proportion."""
+    flags = [proportional(p) for p in hypothesis.free]
+    return flags if len(group) == len(flags) else [all(flags)]
 
 
 def begin(hypothesis: Hypothesis, group: Sequence[Numbers], coefficients: FloatArray
@@ -139,6 +162,6 @@ def begin(hypothesis: Hypothesis, group: Sequence[Numbers], coefficients: FloatA
             continue
         value = neutral + float(factor) * (start - neutral)
         if parameter.lower >= 0.0 and parameter.name not in ('gyro_factor', 'encoder_factor'):
-            value = start * float(np.clip(factor, 0.2, 3.0))
+            value = start * float(factor)
         found[parameter.name] = min(max(value, parameter.lower), parameter.upper)
     return found

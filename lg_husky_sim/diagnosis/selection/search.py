@@ -15,12 +15,14 @@ import math
 
 from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
+from lg_husky_sim.diagnosis.evidence.unknowns import loosened
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     hypotheses,
     Hypothesis,
     neutral_of,
     Numbers,
 )
+from lg_husky_sim.diagnosis.selection.conventions import as_logged
 from lg_husky_sim.diagnosis.selection.onsets import onset_looks, refined
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.settings import setting
@@ -131,8 +133,17 @@ def calibrated(evidence: Evidence, start: Point, times: int = 2) -> tuple[Eviden
     fit = evidence.fit(start)
     for _ in range(times):
         evidence = evidence.renoised(fit)
-        fit = evidence.fit(fit.point, fit.slopes)
+        fit = evidence.fit(with_jitter(fit.point, evidence), fit.slopes)
     return evidence, fit
+
+
+def with_jitter(point: Point, evidence: Evidence) -> Point:
+    """Return a point whose delays may be as large as the jitter of the stamps suggests."""
+    noise = evidence.noise.values
+    unknowns = loosened(point.unknowns, {
+        'command_delay': noise['wheel_jitter'], 'delay_wheels': noise['wheel_jitter'],
+        'delay_imu': noise['imu_jitter'], 'delay_pose': noise['pose_jitter']})
+    return replace(point, unknowns=unknowns).at(point.places)
 
 
 def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Sequence[
@@ -156,22 +167,26 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
     Tried or None
         None where it cannot be simulated.
     """
-    best: Fit | None = None
+    starts = []
     for point, numbers in begins:
         try:
             start = hypothesis.point(point, numbers)
-            own = range(len(point.unknowns), len(start.unknowns))
-            slopes = [np.hstack([one, np.zeros((one.shape[0], len(own)))])
-                      for one in base.slopes]
-            found = evidence.fit(start, slopes, renew=own)
-            if whole:
-                found = evidence.fit(found.point, rounds=int(setting('whole_rounds')))
+            starts.append((evidence.cost(evidence.residuals(evidence.predict(start)), start),
+                           start))
         except LgHuskyError:
             continue
-        if best is None or found.cost < best.cost:
-            best = found
-    if best is None:
+    if not starts:
         return None
+    start = min(starts, key=lambda one: one[0])[1]
+    size = len(base.point.unknowns)
+    own = range(size, len(start.unknowns))
+    slopes = [np.hstack([one, np.zeros((one.shape[0], len(own)))]) for one in base.slopes]
+    few = int(setting('whole_rounds'))
+    best = evidence.fit(start, slopes, rounds=few, renew=own)
+    if best.cost < base.cost + setting('lost'):
+        best = evidence.fit(best.point, best.slopes, renew=own)
+        if whole:
+            best = evidence.fit(best.point, rounds=few)
     return Tried(hypothesis, best, base.cost - best.cost, evidence.count)
 
 
@@ -313,6 +328,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     """
     progress('recalibration', 0.05)
     evidence, base = calibrated(evidence, start)
+    evidence, base = as_logged(evidence, base)
+    start = with_jitter(replace(start, reading=base.point.reading), evidence)
     plain, rounds, found = base, [], []
     least = 0.0
     for number in range(int(setting('most_effects'))):
