@@ -33,7 +33,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
               help='Kept for reproducible scripts: the search itself draws nothing by chance.')
 @click.option('--jobs', type=click.IntRange(min=1), default=None, metavar='N',
-              help='Processes to use; as many as there are cores by default.')
+              help='Threads to use; as many as there are cores by default.')
 @click.option('--report/--no-report', 'with_report', default=True, show_default=True,
               help='Whether to write report.html and the pictures, a third of the time.')
 @spoken(page=True)
@@ -46,8 +46,8 @@ def command(
     Say what physics a model lacks, where it shows, and how much better it gets with it.
 
     The model is recalibrated first, within the tolerances of its parameters. What is left is
-    compared with every effect of the catalogue; one is adopted only if it predicts data better
-    that were not fitted. A folder stands for all bags in it.
+    compared with every effect of the catalogue; one is adopted only if it explains more than chance
+    does at a stated false-alarm rate. A folder stands for all bags in it.
     """
     from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.folders import check_folder

@@ -150,6 +150,15 @@ def smoothed(times: FloatArray, values: FloatArray, width: float) -> FloatArray:
     return np.asarray(solveh_banded(bands, values), dtype=np.float64)
 
 
+def _thinned(series: TimeSeries | None) -> TimeSeries | None:
+    # Every n-th reading of a stream that is faster than what tells more.
+    if series is None or len(series) < 4:
+        return series
+    step = float(np.median(np.diff(series.times)))
+    stride = max(1, int(np.ceil(1.0 / (max(step, 1e-6) * setting('fastest')) - 1e-6)))
+    return TimeSeries(series.times[::stride], series.values[::stride], series.names)
+
+
 def _derived(rates: TimeSeries, angles: TimeSeries) -> bool:
     # Rates that reading made of the angles, in the middle between their stamps: no measurement.
     middles = 0.5 * (angles.times[:-1] + angles.times[1:])
@@ -181,9 +190,9 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
     if 'command' not in streams or segment.duration < setting('shortest_segment'):
         return None
     start = segment.start
-    wheels, imu, pose = (streams.get(n) for n in ('wheels', 'imu', 'pose'))
-    angles = streams.get('wheel_angles')
-    counted = angles is not None and (wheels is None or _derived(wheels, angles))
+    wheels, imu, pose = (_thinned(streams.get(n)) for n in ('wheels', 'imu', 'pose'))
+    angles = _thinned(streams.get('wheel_angles'))
+    counted = angles is not None and (wheels is None or _derived(streams['wheels'], streams['wheel_angles']))
     turning = angles if counted else wheels
     pieces: list[tuple[Channel, FloatArray, FloatArray]] = []
     rates: tuple[float, float] | None = None
