@@ -46,8 +46,8 @@ def command(
     Say what physics a model lacks, where it shows, and how much better it gets with it.
 
     The model is recalibrated first, within the tolerances of its parameters. What is left is
-    compared with every effect of the catalogue; one is adopted only if it explains more than chance
-    does at a stated false-alarm rate. A folder stands for all bags in it.
+    compared with every effect of the catalogue; one is adopted only if it explains more than
+    chance does at a stated false-alarm rate. A folder stands for all bags in it.
     """
     from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.folders import check_folder

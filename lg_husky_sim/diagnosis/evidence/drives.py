@@ -192,7 +192,8 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
     start = segment.start
     wheels, imu, pose = (_thinned(streams.get(n)) for n in ('wheels', 'imu', 'pose'))
     angles = _thinned(streams.get('wheel_angles'))
-    counted = angles is not None and (wheels is None or _derived(streams['wheels'], streams['wheel_angles']))
+    counted = angles is not None and (
+        wheels is None or _derived(streams['wheels'], streams['wheel_angles']))
     turning = angles if counted else wheels
     pieces: list[tuple[Channel, FloatArray, FloatArray]] = []
     rates: tuple[float, float] | None = None

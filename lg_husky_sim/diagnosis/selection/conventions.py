@@ -40,11 +40,9 @@ def as_logged(evidence: Evidence, fit: Fit) -> tuple[Evidence, Fit]:
     """
     chosen = fit
     for options_of in (_wheel_options, _imu_options):
-        start = chosen
-
-        def refit(change: Change, start: Fit = start) -> Fit:
-            return _refitted(evidence, start, change)
-        tried = list(evidence.pool.map(refit, options_of(evidence, chosen.point.reading)))
+        # One after the other: a fit has work for all threads itself.
+        tried = [_refitted(evidence, chosen, change)
+                 for change in options_of(evidence, chosen.point.reading)]
         best = min(tried, key=lambda one: one.cost, default=chosen)
         if best.cost < chosen.cost - setting('reading_gain'):
             chosen = best
