@@ -1,7 +1,7 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How sure an answer is, by logistic functions that were calibrated on tuning worlds.
+How sure an answer is, by logistic functions of what informs about it.
 
 Posterior odds carry no information: the form of no law is exact, so that they are near 1 for right
 and wrong names alike. What informs is the margin to the next name, ``1 - gain_2 / gain_1``, what a
