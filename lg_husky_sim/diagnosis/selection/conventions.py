@@ -21,22 +21,20 @@ import numpy as np
 Change = tuple[WheelReading, float | None, float]
 
 
-def as_logged(evidence: Evidence, fit: Fit) -> tuple[Evidence, Fit]:
+def best_reading(evidence: Evidence, fit: Fit) -> Fit:
     """
-    Choose the reading that makes the recalibrated model likeliest.
+    Choose the reading that makes a fitted model likeliest.
 
     Parameters
     ----------
     evidence : Evidence
     fit : Fit
-        Of the base.
+        Of the model.
 
     Returns
     -------
-    Evidence
-        With its noise found anew where another reading is chosen.
     Fit
-        Under that noise.
+        With that reading, under the same noise; the given one where none is better.
     """
     chosen = fit
     for options_of in (_wheel_options, _imu_options):
@@ -53,10 +51,7 @@ def as_logged(evidence: Evidence, fit: Fit) -> tuple[Evidence, Fit]:
                                               chosen.point.reading.imu, factor * window))
                  for factor in (0.7, 0.85, 1.18, 1.4)]
         chosen = min([chosen, *tried], key=lambda one: one.cost)
-    if chosen is fit:
-        return evidence, fit
-    evidence = evidence.renoised(chosen)
-    return evidence, evidence.fit(chosen.point)
+    return chosen
 
 
 def _refitted(evidence: Evidence, fit: Fit, change: Change) -> Fit:

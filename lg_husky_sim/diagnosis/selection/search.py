@@ -22,7 +22,7 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     neutral_of,
     Numbers,
 )
-from lg_husky_sim.diagnosis.selection.conventions import as_logged
+from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.onsets import onset_looks, refined
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.settings import setting
@@ -309,6 +309,26 @@ def _fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequen
     return list(once.values())
 
 
+def _as_logged(evidence: Evidence, base: Fit) -> tuple[Evidence, Fit, bool]:
+    # A missing effect can pass for another reading of the sensors. Where an effect promises more
+    # than the reading gains, the reading waits until the effect is in the model.
+    chosen = best_reading(evidence, base)
+    if chosen is base:
+        return evidence, base, False
+    pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
+    seen = look(evidence, base, pool)
+    if seen and seen[0].gain > base.cost - chosen.cost:
+        return evidence, base, True
+    return (*_read_as(evidence, base, chosen), False)
+
+
+def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]:
+    if chosen is base:
+        return evidence, base
+    evidence = evidence.renoised(chosen)
+    return evidence, evidence.fit(with_jitter(chosen.point, evidence))
+
+
 def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     """
     Find what a model lacks.
@@ -328,7 +348,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     """
     progress('recalibration', 0.05)
     evidence, base = calibrated(evidence, start)
-    evidence, base = as_logged(evidence, base)
+    evidence, base, postponed = _as_logged(evidence, base)
     start = with_jitter(replace(start, reading=base.point.reading), evidence)
     plain, rounds, found = base, [], []
     least = 0.0
@@ -348,4 +368,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         found.append(best.hypothesis)
         least = setting('least_part') * rounds[0].tried[0].gain
         evidence, base = calibrated(evidence, best.fit.point, 1)
+        if postponed:
+            evidence, base = _read_as(evidence, base, best_reading(evidence, base))
+            postponed = False
     return Search(plain, base, evidence, tuple(rounds), tuple(found))
