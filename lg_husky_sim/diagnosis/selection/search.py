@@ -190,12 +190,6 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
     return Tried(hypothesis, best, base.cost - best.cost, evidence.count)
 
 
-def base_of(fit: Fit, size: int) -> Point:
-    """Return the first unknowns of a fit as a point of the base's structure."""
-    point = fit.point
-    return replace(point, unknowns=point.unknowns[:size], places=point.places[:size])
-
-
 def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
                nominal: Point | None, least: float = 0.0) -> Round:
     """
