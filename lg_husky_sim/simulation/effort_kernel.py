@@ -13,7 +13,7 @@ import math
 from typing import NamedTuple
 
 from lg_husky_sim.husky.laws import evaluate
-from lg_husky_sim.jit import jit_call
+from lg_husky_sim.jit import jit_call, jit_part
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.modal_kernel import add_product, advance, Packed, phis
 
@@ -21,9 +21,9 @@ from lg_husky_sim.simulation.modal_kernel import add_product, advance, Packed, p
 WHEEL_ERROR, SPEED_ERROR, YAW_ERROR = 2e-5, 3e-6, 5e-6
 #: Iterations of a step at most, and the share of the allowed error at which they end.
 ITERATIONS, CONVERGED = 8, 0.1
-#: Error of a parabola in the middle of its step, as a share of its cubic term; of the first step
+#: Error of a parabola inside its step, as a share of its cubic term; of the first step
 #: after a jump, as a share of its square term.
-CUBIC, SQUARE = 0.016, 0.1
+CUBIC, SQUARE = 0.05, 0.1
 #: Bounds of the slope of an effort in its own change, for Steffensen's step.
 STEEPEST, FLATTEST = -50.0, 0.5
 
@@ -69,7 +69,7 @@ class Step(NamedTuple):
     new: FloatArray
 
 
-@jit_call
+@jit_part
 def effect(plant: Packed, c: int, change: FloatArray, t: float, p: FloatArray, work: FloatArray,
            four: FloatArray) -> float:
     """Return what a change of the efforts over ``t`` [s] does, in parts of what is allowed."""
@@ -92,7 +92,7 @@ def effect(plant: Packed, c: int, change: FloatArray, t: float, p: FloatArray, w
     return float(max(wheels, base))
 
 
-@jit_call
+@jit_part
 def memories(plant: Packed, c: int, begin: FloatArray, z: FloatArray, last: int, step: float,
              memory: FloatArray) -> None:
     """Put heat and play after ``step`` [s] into ``memory``: at the middle (1) or the end (2)."""
@@ -115,7 +115,7 @@ def memories(plant: Packed, c: int, begin: FloatArray, z: FloatArray, last: int,
             memory[2 + side] = max(-0.5 * p0, min(0.5 * p0, begin[2 + side] + step * mean))
 
 
-@jit_call
+@jit_part
 def arguments(plant: Packed, c: int, row: int, xi: FloatArray, u: FloatArray, z: FloatArray,
               line: FloatArray) -> None:
     """Put the laws' arguments at modes and voltages into ``line`` and a row of ``z``."""
@@ -128,7 +128,7 @@ def arguments(plant: Packed, c: int, row: int, xi: FloatArray, u: FloatArray, z:
         z[row, i] = line[i]
 
 
-@jit_call
+@jit_part
 def surroundings(context: FloatArray, time: float, s: FloatArray, n: int, four: FloatArray,
                  tangent: FloatArray) -> None:
     """Put time, heading, x, y and angles after the integrals ``four`` of a step in context."""
@@ -142,7 +142,7 @@ def surroundings(context: FloatArray, time: float, s: FloatArray, n: int, four: 
     context[5] = s[n + 1] + four[1]
 
 
-@jit_call
+@jit_part
 def _efforts_at(plant: Packed, c: int, s: FloatArray, n: int, time: float, at: float, node: int,
                 p: FloatArray, step: Step, memory: FloatArray, kept: FloatArray) -> None:
     # Evaluate the laws at the middle (node 1) or the end (2) into step.new.
@@ -162,7 +162,7 @@ def _efforts_at(plant: Packed, c: int, s: FloatArray, n: int, time: float, at: f
              step.new)
 
 
-@jit_call
+@jit_part
 def bend(plant: Packed, c: int, h: float, step: Step) -> None:
     """Put the parabola through the efforts and the voltages' slope into a1, a2 and q."""
     for e in range(step.f0.size):
@@ -177,7 +177,7 @@ def bend(plant: Packed, c: int, h: float, step: Step) -> None:
         step.q[0, i], step.q[1, i] = linear, square
 
 
-@jit_call
+@jit_part
 def _stiffly(found: FloatArray, change: FloatArray, old: FloatArray) -> None:
     # Steffensen's step, effort by effort: dissipation may be far stiffer than the modes.
     for e in range(found.size):

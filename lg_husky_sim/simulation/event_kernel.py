@@ -25,7 +25,7 @@ import math
 from typing import NamedTuple
 
 from lg_husky_sim.husky.laws import CONTEXT, evaluate, MEMORY
-from lg_husky_sim.jit import jit, jit_call
+from lg_husky_sim.jit import jit, jit_call, jit_part
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.effort_kernel import arguments, bend, solve, Step, surroundings
 from lg_husky_sim.simulation.modal_kernel import add_product, advance, Packed, phis, rate_of
@@ -40,8 +40,9 @@ COLUMNS = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate', 'current_left', '
 TAIL = 4 + 3 + MEMORY + 2 + 2
 #: Shortest and longest step of a plant with efforts [s].
 SHORTEST, LONGEST = 1e-5, 0.025
-#: Panels of the pose: just after a jump of the voltage, its length [s], later, and turned [rad].
-PANEL_JUMP, JUMP, PANEL, PANEL_TURN = 0.005, 0.02, 0.02, 0.02
+#: Panels of the pose: the first after a jump [s], growth with the time since then, the longest
+#: [s], and turned in one [rad].
+PANEL_FIRST, PANEL_GROWTH, PANEL, PANEL_TURN = 0.0005, 0.35, 0.008, 0.01
 #: Relative room in which a voltage is at its clamp; time that tells two events apart [s].
 ROOM, APART = 1e-9, 1e-12
 
@@ -63,7 +64,7 @@ class Drive(NamedTuple):
     given: NDArray[np.int64]
 
 
-@jit_call
+@jit_part
 def _clamped(u: FloatArray, du: FloatArray, clamp: float, t: float, until: float) -> float:
     # Hold voltages at the clamp, and return when the next one meets or leaves it.
     for i in range(2):
@@ -81,7 +82,7 @@ def _clamped(u: FloatArray, du: FloatArray, clamp: float, t: float, until: float
     return until
 
 
-@jit_call
+@jit_part
 def _event(plant: Packed, c: int, t: float, end: float, stamps: FloatArray, values: FloatArray,
            drive: Drive, u: FloatArray, du: FloatArray) -> float:
     # Set the voltages and their slopes from t on, and return until when they are straight.
@@ -121,7 +122,7 @@ def _event(plant: Packed, c: int, t: float, end: float, stamps: FloatArray, valu
     return until
 
 
-@jit_call
+@jit_part
 def _change_set(plant: Packed, old: int, c: int, states: FloatArray, xi: FloatArray) -> None:
     # Modes of another set for the same states; those of the start where old is negative.
     if old >= 0:
@@ -135,7 +136,7 @@ def _change_set(plant: Packed, old: int, c: int, states: FloatArray, xi: FloatAr
             xi[m] += plant.into[c, m, i] * states[i]
 
 
-@jit_call
+@jit_part
 def _row(out: FloatArray, j: int, y: FloatArray, s: FloatArray, n: int, four: FloatArray,
          x: float, y_place: float, play: FloatArray) -> None:
     # Encoders turn with the motors, which run ahead of the wheels within the gears' play.
@@ -151,21 +152,18 @@ def _row(out: FloatArray, j: int, y: FloatArray, s: FloatArray, n: int, four: Fl
     out[j, 13], out[j, 14] = y[7], y[8]
 
 
-@jit_call
+@jit_part
 def _play_at(step: Step, memory: FloatArray, goal: float, whole: float, play: FloatArray
              ) -> None:
-    # Play of both gears and its rates, straight between the places where it is known.
+    # Play of both gears and its rates: a parabola through the places where it is known.
     for i in range(2, 4):
-        if 2.0 * goal <= whole:
-            rate = (step.middle[i] - memory[i]) / (0.5 * whole)
-            play[i - 2] = memory[i] + goal * rate
-        else:
-            rate = (step.finish[i] - step.middle[i]) / (0.5 * whole)
-            play[i - 2] = step.finish[i] - (whole - goal) * rate
-        play[i] = rate
+        slope = (4.0 * step.middle[i] - 3.0 * memory[i] - step.finish[i]) / whole
+        bend_by = 2.0 * (memory[i] - 2.0 * step.middle[i] + step.finish[i]) / (whole * whole)
+        play[i - 2] = memory[i] + goal * (slope + goal * bend_by)
+        play[i] = slope + 2.0 * goal * bend_by
 
 
-@jit_call
+@jit_part
 def _outputs(plant: Packed, c: int, xi: FloatArray, u: FloatArray, f: FloatArray, y: FloatArray
              ) -> None:
     for i in range(y.size):
@@ -175,48 +173,15 @@ def _outputs(plant: Packed, c: int, xi: FloatArray, u: FloatArray, f: FloatArray
     add_product(plant.cf, c, f, f.size, y)
 
 
-@jit
-def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray,
-        out: FloatArray, end: float, fine: bool, plant: Packed) -> int:
-    """
-    Advance the flat state ``s`` to ``end`` [s], in place.
-
-    Parameters
-    ----------
-    s : numpy.ndarray
-        Flat state, laid out as the module says.
-    stamps, values : numpy.ndarray, shapes (n_commands,), (n_commands, 2)
-        Commands [m/s, rad/s] and when they are given [s], not decreasing; each holds until the
-        next.
-    times : numpy.ndarray, shape (n_times,)
-        Where output is wanted [s], not decreasing, from the state's time to ``end``.
-    out : numpy.ndarray, shape (n_times, 15)
-        Receives :data:`COLUMNS`; at a jump, what was before it.
-    end : float
-    fine : bool
-        Whether x and y are wanted to better than 1e-7 m; else they are chords between the times.
-    plant : Packed
-
-    Returns
-    -------
-    int
-        Steps taken.
-    """
+@jit_call
+def _follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray,
+            out: FloatArray, end: float, fine: bool, plant: Packed, step: Step, drive: Drive,
+            p: FloatArray, y: FloatArray, play: FloatArray, states: FloatArray,
+            memory: FloatArray) -> int:
+    # What run does, with its arrays: here none is counted.
     n, size, most = plant.out_of.shape[1], plant.rates.shape[1], plant.laws.shape[1]
-    step = Step(
-        np.zeros(size), np.zeros(size), np.zeros((2, size)), np.zeros(2), np.zeros(2),
-        np.zeros(most), np.zeros(most), np.zeros(most), np.zeros(most), np.zeros(most),
-        np.zeros(most), np.zeros(most), np.zeros((3, plant.hm.shape[2])),
-        np.zeros(plant.hm.shape[2]), np.zeros(CONTEXT), np.zeros(MEMORY), np.zeros(MEMORY),
-        np.zeros(2), np.zeros((4, size)), np.zeros((4, size)), np.zeros(size), np.zeros(size),
-        np.zeros(2), np.zeros(4), np.zeros(most), np.zeros(most), np.zeros(most),
-        np.zeros(most), np.zeros(most))
     xi, r, q, u, du, f0, xt = step.xi, step.r, step.q, step.u, step.du, step.f0, step.xt
     four, tangent, ut, new, work = step.four, step.tangent, step.ut, step.new, step.work
-    p, y, play, states = np.zeros((4, size)), np.zeros(plant.cy.shape[2]), np.zeros(4), s[:n]
-    memory = s[n + 7:n + 11]
-    drive = Drive(np.zeros(2), np.zeros(2), np.zeros(2), np.full(2, np.inf), np.zeros(2),
-                  np.zeros(1, dtype=np.int64))
     for i in range(2):
         drive.shaped[i], drive.wanted[i] = s[n + 11 + i], s[n + 13 + i]
     t, until, onset, kind = s[n + 6], s[n + 6], plant.onset[1], plant.onset[0]
@@ -298,15 +263,15 @@ def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray
                     goal = times[j] - t
                     asked = True
                 if fine:
-                    limit = min(PANEL_JUMP if tau < JUMP else PANEL,
+                    limit = min(min(PANEL, max(PANEL_FIRST, PANEL_GROWTH * tau)),
                                 PANEL_TURN / max(abs(y[3]), 1e-9))
                     if goal - tau > limit:
-                        goal = tau + (goal - tau) / math.ceil((goal - tau) / limit)
+                        goal = tau + min(limit, 0.5 * (goal - tau))
                         asked = False
             phis(goal, plant.rates, c, n_real, n_pairs, p)
             advance(goal, 0, xi, r, q, p, n_real, n_pairs, degree, xt)
             advance(goal, 1, xi, r, q, p, n_real, n_pairs, degree, work)
-            v, w, a, b = y[2], y[3], y[6], y[9]
+            v, w, a, b = y[2], y[3], y[10], y[9]
             for i in range(4):
                 four[i] = 0.0
             add_product(plant.ci, c, work, size, four)
@@ -319,9 +284,9 @@ def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray
             sine, less = math.sin(turned), math.sin(0.5 * turned)
             less = -2.0 * less * less
             across = 0.5 * width * y[2] * sine + width * width / 12.0 * (
-                v * w - y[6] * sine - y[2] * y[3] * (1.0 + less))
+                v * w - y[10] * sine - y[2] * y[3] * (1.0 + less))
             along = went + 0.5 * width * y[2] * less - width * width / 12.0 * (
-                y[6] * less - y[2] * y[3] * sine)
+                y[10] * less - y[2] * y[3] * sine)
             x_new = s[n + 4] + tangent[0] * along - tangent[1] * across
             y_new = s[n + 5] + tangent[1] * along + tangent[0] * across
             if kind >= 2.0:
@@ -337,7 +302,7 @@ def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray
                 elif searching:
                     beyond = not beyond
                 if searching and goal < h:
-                    y[2], y[3], y[6], y[9] = v, w, a, b
+                    y[2], y[3], y[10], y[9] = v, w, a, b
                     continue
             s[n + 4], s[n + 5] = x_new, y_new
             cosine = tangent[0] * (1.0 + less) - tangent[1] * sine
@@ -377,3 +342,46 @@ def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray
     for i in range(2):
         s[n + 11 + i], s[n + 13 + i] = drive.shaped[i], drive.wanted[i]
     return steps
+
+
+@jit
+def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray,
+        out: FloatArray, end: float, fine: bool, plant: Packed) -> int:
+    """
+    Advance the flat state ``s`` to ``end`` [s], in place.
+
+    Parameters
+    ----------
+    s : numpy.ndarray
+        Flat state, laid out as the module says.
+    stamps, values : numpy.ndarray, shapes (n_commands,), (n_commands, 2)
+        Commands [m/s, rad/s] and when they are given [s], not decreasing; each holds until the
+        next.
+    times : numpy.ndarray, shape (n_times,)
+        Where output is wanted [s], not decreasing, from the state's time to ``end``.
+    out : numpy.ndarray, shape (n_times, 15)
+        Receives :data:`COLUMNS`; at a jump, what was before it.
+    end : float
+    fine : bool
+        Whether x and y are wanted to better than 1e-7 m; else they are chords between the times.
+    plant : Packed
+
+    Returns
+    -------
+    int
+        Steps taken.
+    """
+    n, size, most = plant.out_of.shape[1], plant.rates.shape[1], plant.laws.shape[1]
+    step = Step(
+        np.zeros(size), np.zeros(size), np.zeros((2, size)), np.zeros(2), np.zeros(2),
+        np.zeros(most), np.zeros(most), np.zeros(most), np.zeros(most), np.zeros(most),
+        np.zeros(most), np.zeros(most), np.zeros((3, plant.hm.shape[2])),
+        np.zeros(plant.hm.shape[2]), np.zeros(CONTEXT), np.zeros(MEMORY), np.zeros(MEMORY),
+        np.zeros(2), np.zeros((4, size)), np.zeros((4, size)), np.zeros(size), np.zeros(size),
+        np.zeros(2), np.zeros(4), np.zeros(most), np.zeros(most), np.zeros(most),
+        np.zeros(most), np.zeros(most))
+    drive = Drive(np.zeros(2), np.zeros(2), np.zeros(2), np.full(2, np.inf), np.zeros(2),
+                  np.zeros(1, dtype=np.int64))
+    return _follow(s, stamps, values, times, out, end, fine, plant, step, drive,
+                   np.zeros((4, size)), np.zeros(plant.cy.shape[2]), np.zeros(4), s[:n],
+                   s[n + 7:n + 11])

@@ -47,7 +47,7 @@ class Packed(NamedTuple):
     hm, k : numpy.ndarray, shapes (n_sets, n_modes or 2, n_arguments)
         Arguments of the efforts.
     cy, cu, cf : numpy.ndarray, shapes (n_sets, n_modes, 2 or n_efforts, 12)
-        Outputs of the plant, then the yaw acceleration.
+        Outputs of the plant, then the derivatives of yaw rate and speed.
     ci : numpy.ndarray, shape (n_sets, n_modes, 4)
         Wheel rates, speed and yaw rate.
     laws, coefficients, offsets : numpy.ndarray, shapes (n_sets, n_efforts[, laws.WIDTH])

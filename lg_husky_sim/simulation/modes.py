@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeVar
 
 from lg_husky_sim.husky.effects import OnsetKind
@@ -20,8 +21,11 @@ from numpy.typing import NDArray
 WORST_CONDITION = 1e7
 #: Relative size of that perturbation: the matrices' own numbers are known far worse.
 PERTURBATION = 1e-10
-#: Rows of the outputs in the kernel: those of the plant, and the yaw acceleration [rad/s²].
-ROWS = 10
+#: Entries of a matrix that are rounding, relative to the largest.
+NOTHING = 1e-15
+#: Rows of the outputs in the kernel: those of the plant, the yaw acceleration [rad/s²] and the
+#: derivative of the forward speed [m/s²], which is no specific force on a slope.
+ROWS = 11
 _LANES = 4
 _ONSETS = {OnsetKind.TIME: 1.0, OnsetKind.PLACE_ABOVE: 2.0, OnsetKind.PLACE_BELOW: 3.0}
 _CONTEXTUAL = (Law.HEADING, Law.WHEEL_PHASE, Law.TABLE)
@@ -52,19 +56,53 @@ class Modes:
     into: FloatArray
 
 
-def modes_of(a: FloatArray) -> Modes:
+def modes_of(a: FloatArray, mixing: FloatArray | None = None) -> Modes:
     """
     Return the modes of a matrix.
 
     Parameters
     ----------
     a : numpy.ndarray, shape (n, n)
+    mixing : numpy.ndarray, shape (n, n), optional
+        Coordinates mixing @ x in which a may fall apart into blocks, such as the mean of both
+        sides and their difference; modes then stay apart to the last bit.
 
     Returns
     -------
     Modes
         Of a matrix nearby (:data:`PERTURBATION`) where equal eigenvalues share an eigenvector.
     """
+    n = a.shape[0]
+    mixing = np.eye(n) if mixing is None else mixing
+    back = np.linalg.inv(mixing)
+    mixed = mixing @ a @ back
+    values = np.zeros(n, dtype=np.complex128)
+    vectors = np.zeros((n, n), dtype=np.complex128)
+    inverse = np.zeros((n, n), dtype=np.complex128)
+    for block in _blocks(mixed):
+        place = np.ix_(block, block)
+        values[block], vectors[place], inverse[place] = _decomposed(mixed[place])
+    vectors, inverse = back @ vectors, inverse @ mixing
+    real = np.flatnonzero(values.imag == 0.0)
+    pairs = np.flatnonzero(values.imag > 0.0)
+    rates = np.concatenate([values[real].real, values[pairs].real, values[pairs].imag])
+    out_of = np.concatenate([vectors[:, real].real, 2.0 * vectors[:, pairs].real,
+                             -2.0 * vectors[:, pairs].imag], axis=1)
+    into = np.concatenate([inverse[real].real, inverse[pairs].real, inverse[pairs].imag])
+    return Modes(real.size, pairs.size, rates, out_of, into)
+
+
+def _blocks(a: FloatArray) -> list[NDArray[np.intp]]:
+    # States that act on each other, over any number of others.
+    linked = np.abs(a) > NOTHING * np.max(np.abs(a), initial=0.0)
+    linked = linked | linked.T | np.eye(a.shape[0], dtype=bool)
+    for _ in range(max(1, a.shape[0].bit_length())):
+        linked = linked @ linked
+    blocks = {row.tobytes(): np.flatnonzero(row) for row in linked}
+    return list(blocks.values())
+
+
+def _decomposed(a: FloatArray) -> tuple[NDArray[np.complex128], ...]:
     values, vectors = np.linalg.eig(a)
     inverse = _inverse(vectors)
     if inverse is None:
@@ -73,14 +111,26 @@ def modes_of(a: FloatArray) -> Modes:
         shake = np.random.default_rng(0).uniform(-1.0, 1.0, a.shape)
         values, vectors = np.linalg.eig(a + PERTURBATION * size * shake)
         inverse = np.linalg.inv(vectors)
-    real = np.flatnonzero(values.imag == 0.0)
-    pairs = np.flatnonzero(values.imag > 0.0)
-    whole = values.astype(np.complex128)
-    rates = np.concatenate([whole[real].real, whole[pairs].real, whole[pairs].imag])
-    out_of = np.concatenate([vectors[:, real].real, 2.0 * vectors[:, pairs].real,
-                             -2.0 * vectors[:, pairs].imag], axis=1)
-    into = np.concatenate([inverse[real].real, inverse[pairs].real, inverse[pairs].imag])
-    return Modes(real.size, pairs.size, rates, out_of, into)
+    return values, vectors, inverse
+
+
+#: Names of the left side's parts in those of states, and of the right side's.
+_SIDES = (('LW', 'RW'), ('(L_1)', '(L_2)'), ('J_RL', 'J_RR'), ('J_FL', 'J_FR'),
+          ('BeltL', 'BeltR'), ('(left)', '(right)'))
+
+
+@lru_cache(maxsize=64)
+def _sides_mixed(states: tuple[str, ...]) -> FloatArray:
+    # Sum and difference of both sides; the other states as they are.
+    mixing = np.eye(len(states))
+    for left, right in _SIDES:
+        for i, state in enumerate(states):
+            twin = state.replace(left, right)
+            if twin != state and twin in states:
+                j = states.index(twin)
+                mixing[i, j], mixing[j, i], mixing[j, j] = 1.0, 1.0, -1.0
+    mixing.setflags(write=False)
+    return mixing
 
 
 def _inverse(vectors: NDArray[np.complex128]) -> NDArray[np.complex128] | None:
@@ -106,11 +156,11 @@ def _padded(array: _Numbers, shape: tuple[int, ...], value: int = 0) -> _Numbers
 
 
 def _rows(one: PlantSet) -> tuple[FloatArray, FloatArray, FloatArray]:
-    # Outputs with the yaw acceleration as a further row, transposed.
-    yaw = one.rows[3]
-    rows = np.vstack([one.rows, yaw @ one.a])
-    rows_u = np.vstack([one.rows_u, yaw @ one.b])
-    rows_f = np.vstack([one.rows_f, yaw @ one.g])
+    # Outputs with the derivatives of yaw rate and speed as further rows, transposed.
+    body = one.rows[[3, 2]]
+    rows = np.vstack([one.rows, body @ one.a])
+    rows_u = np.vstack([one.rows_u, body @ one.b])
+    rows_f = np.vstack([one.rows_f, body @ one.g])
     return rows.T, rows_u.T, rows_f.T
 
 
@@ -128,7 +178,8 @@ def packed(plant: Plant) -> Packed:
     """
     sets = tuple(merged(one) for one in plant.sets)
     n = sets[0].a.shape[0]
-    modes = [modes_of(one.a) for one in sets]
+    mixing = _sides_mixed(plant.states)
+    modes = [modes_of(one.a, mixing) for one in sets]
     # Whole vectors of the processor: dummies at rest fill the last one.
     size = -(-max(mode.rates.size for mode in modes) // _LANES) * _LANES
     efforts = max(one.laws.size for one in sets)
