@@ -20,6 +20,7 @@ ARGUMENTS = (
     ('preset', 'paper', 'paper, husky_ros1 or clearpath_jazzy'),
     ('namespace', '', 'namespace of all nodes'),
     ('model', '', 'model file; empty: the packaged Husky'),
+    ('parameters', '', 'file of parameters for sim_node, such as config/nav2.yaml'),
     ('state_publisher', 'auto', 'robot_state_publisher with the packaged URDF: true, false, or '
      'auto: if it is installed'),
     ('rviz', 'false', 'start RViz with the packaged layout'),
@@ -60,12 +61,18 @@ def _start(context: LaunchContext) -> list[LogInfo | Node]:
     share = Path(get_package_share_directory('lg_husky_sim'))
     namespace, preset = value('namespace'), value('preset')
     # tf must show the base, or nothing can be drawn.
-    parameters: dict[str, object] = {'preset': preset, 'publish_tf': True}
+    own: dict[str, object] = {'preset': preset, 'publish_tf': True}
     if value('model'):
-        parameters['model'] = value('model')
+        own['model'] = value('model')
+    parameters: list[object] = [own]
+    if value('parameters'):
+        if not Path(value('parameters')).is_file():
+            message = f'parameters:={value("parameters")}: no such file'
+            raise RuntimeError(message)
+        parameters.append(value('parameters'))
     actions: list[LogInfo | Node] = [
         Node(package='lg_husky_sim', executable='sim_node', namespace=namespace,
-             parameters=[parameters], output='screen')]
+             parameters=parameters, output='screen')]
     if value('state_publisher') == 'auto' and not _installed('robot_state_publisher'):
         actions.append(LogInfo(msg='robot_state_publisher is not installed: no wheels on tf'))
     elif value('state_publisher') != 'false':

@@ -191,24 +191,35 @@ def fill_imu(message: Any, nanoseconds: int, reading: Reading) -> None:
     accel.x, accel.y, accel.z = measured.accel
 
 
-def transform_message(settings: Settings) -> Any:
-    """Return a tf2_msgs/msg/TFMessage with one transform, or None without tf2_msgs."""
+def transform_message(parent: str, child: str) -> Any:
+    """Return a TFMessage with one transform between frames, or None without tf2_msgs."""
     kind = message_type('tf2_msgs/msg/TFMessage')
     if kind is None:
         return None
     transform = message_type('geometry_msgs/msg/TransformStamped')()
-    transform.header.frame_id = settings.odom_frame
-    transform.child_frame_id = settings.base_frame
+    transform.header.frame_id = parent
+    transform.child_frame_id = child
     return kind(transforms=[transform])
 
 
 def fill_transform(message: Any, nanoseconds: int, pose: Pose) -> None:
-    """Put the base's pose into a TFMessage."""
+    """Put the child's pose into a TFMessage."""
     transform = message.transforms[0]
     set_stamp(transform.header.stamp, nanoseconds)
     place = transform.transform.translation
     place.x, place.y = pose.x, pose.y
     set_heading(transform.transform.rotation, pose.heading)
+
+
+def scan_message(settings: Settings) -> Any:
+    """Return a sensor_msgs/msg/LaserScan with all but stamp and ranges."""
+    message = message_type('sensor_msgs/msg/LaserScan')()
+    message.header.frame_id = settings.scan_frame
+    message.angle_min, message.angle_max = settings.scan_angle_min, settings.scan_angle_max
+    message.angle_increment = settings.scan_angle_increment
+    message.scan_time = settings.every('scan_rate') * settings.period
+    message.range_min, message.range_max = settings.scan_range_min, settings.scan_range_max
+    return message
 
 
 def battery_message(settings: Settings) -> Any:

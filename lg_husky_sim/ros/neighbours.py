@@ -18,9 +18,18 @@ def topics_out(settings: Settings) -> tuple[str, ...]:
              settings.imu_topic]
     if settings.publish_battery:
         names.append(settings.battery_topic)
+    if settings.scan != 'none':
+        names.append(settings.scan_topic)
     if settings.publish_clock:
         names.append('/clock')
     return tuple(names)
+
+
+def shared(settings: Settings) -> tuple[str, ...]:
+    """Return the topics that a node of these settings shares with others."""
+    static = settings.scan != 'none' and settings.publish_scan_tf
+    moving = settings.publish_tf or settings.publish_map_tf
+    return (*(['tf'] if moving else []), *(['tf_static'] if static else []))
 
 
 def announce(node: Node, settings: Settings) -> None:
@@ -29,9 +38,11 @@ def announce(node: Node, settings: Settings) -> None:
         return ', '.join(node.resolve_topic_name(topic) for topic in topics)
 
     log = node.get_logger()
-    log.info(f'in: {named((settings.command_topic, settings.initial_pose_topic))} '
-             f'({settings.command_type})')
-    log.info(f'out: {named((*topics_out(settings), *(["tf"] if settings.publish_tf else [])))}')
+    seen = settings.scan == 'map' and not settings.map_file
+    topics = (settings.command_topic, settings.initial_pose_topic,
+              *([settings.map_topic] if seen else []))
+    log.info(f'in: {named(topics)} ({settings.command_type})')
+    log.info(f'out: {named((*topics_out(settings), *shared(settings)))}')
 
 
 class Neighbours:

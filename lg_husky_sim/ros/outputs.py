@@ -69,7 +69,8 @@ class Outputs:
         self._wheels_message = conversions.joint_state_message(settings)
         self._imu_message = conversions.imu_message(settings)
         self._battery_message = conversions.battery_message(settings)
-        self._tf_message = conversions.transform_message(settings) if self._tf else None
+        self._tf_message = conversions.transform_message(
+            settings.odom_frame, settings.base_frame) if self._tf else None
         self._imu_every = settings.every('imu_rate')
         self._wheels_every = settings.every('joint_states_rate')
         self._imu_delay = round(settings.imu_latency * settings.rate)

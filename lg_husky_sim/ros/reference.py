@@ -21,7 +21,7 @@ PRESETS = ('paper', 'husky_ros1', 'clearpath_jazzy')
 _TOPICS = (
     ('command_topic', 'geometry_msgs/{command_type}', 'in', 'velocity command'),
     ('initial_pose_topic', 'geometry_msgs/PoseWithCovarianceStamped', 'in',
-     'puts the robot somewhere, at rest'),
+     'puts the robot somewhere, at rest; with `publish_map_tf` only in the map'),
     ('odometry_topic', 'nav_msgs/Odometry', 'out', 'wheel odometry, every step'),
     ('ground_truth_topic', 'nav_msgs/Odometry', 'out', 'truth of the model, every step'),
     ('joint_states_topic', 'sensor_msgs/JointState', 'out',
@@ -29,9 +29,13 @@ _TOPICS = (
     ('imu_topic', 'sensor_msgs/Imu', 'out', 'gyro, accelerometer, orientation, `imu_rate`'),
     ('battery_topic', 'sensor_msgs/BatteryState', 'out',
      'voltage and current once a second, `publish_battery`'),
+    ('scan_topic', 'sensor_msgs/LaserScan', 'out', 'laser scan, best effort, `scan`'),
+    ('map_topic', 'nav_msgs/OccupancyGrid', 'in', 'what the scan sees, `scan: map`'),
 )
 _FIXED = (
-    ('tf', 'tf2_msgs/TFMessage', 'out', 'odom to base_link, every step, `publish_tf`'),
+    ('tf', 'tf2_msgs/TFMessage', 'out',
+     'odom to base_link, every step, `publish_tf`; map to odom, `publish_map_tf`'),
+    ('tf_static', 'tf2_msgs/TFMessage', 'out', 'base_link to the laser, `publish_scan_tf`'),
     ('/clock', 'rosgraph_msgs/Clock', 'out', 'simulated time, every step, `publish_clock`'),
     ('diagnostics', 'diagnostic_msgs/DiagnosticArray', 'out',
      'rate and lateness once a second, `publish_diagnostics`'),

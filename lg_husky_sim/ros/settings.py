@@ -178,6 +178,29 @@ TABLE: tuple[Setting, ...] = (
     Setting('imu_x', float, "IMU ahead of the base's origin", 'm', -10.0, 10.0),
     Setting('imu_y', float, "IMU to the left of the base's origin", 'm', -10.0, 10.0),
     Setting('gravity', float, 'what the accelerometer reads on z', 'm/s²', 0.0, 100.0),
+    Setting('publish_map_tf', bool, 'publish map_frame to odom_frame on tf, as a localisation '
+            'that knows the truth; initial_pose_topic then corrects it'),
+    Setting('map_frame', str, 'frame of the map'),
+    Setting('scan', str, 'publish a laser scan in which nothing is near, or one of the map',
+            choices=('none', 'free', 'map')),
+    Setting('map_file', str, 'YAML file of a map with a PGM image; empty: map_topic'),
+    Setting('map_topic', str, 'map that the scan sees'),
+    Setting('map_occupied', int, 'occupancy from which on a cell is seen', '%', 1, 100),
+    Setting('scan_topic', str, 'laser scan'),
+    Setting('scan_frame', str, 'frame of the laser'),
+    Setting('publish_scan_tf', bool, 'publish base_frame to scan_frame on tf_static'),
+    Setting('scan_rate', float, 'scans per simulated second; 0: as rate', 'Hz', 0.0, 1000.0),
+    Setting('scan_x', float, "laser ahead of the base's origin", 'm', -10.0, 10.0),
+    Setting('scan_y', float, "laser to the left of the base's origin", 'm', -10.0, 10.0),
+    Setting('scan_heading', float, "laser's x axis against the base's", 'rad', -10.0, 10.0),
+    Setting('scan_angle_min', float, 'angle of the first ray', 'rad', -10.0, 10.0),
+    Setting('scan_angle_max', float, 'no ray is at or beyond this angle', 'rad', -10.0, 10.0),
+    Setting('scan_angle_increment', float, 'angle between rays', 'rad', 1e-4, 10.0),
+    Setting('scan_range_min', float, 'shortest range', 'm', 0.0, 1000.0),
+    Setting('scan_range_max', float, 'longest range', 'm', 0.1, 1000.0),
+    Setting('scan_stddev', float, 'noise of ranges, drawn where sensor_noise is set', 'm', 0.0,
+            10.0, live=True),
+    Setting('scan_use_inf', bool, 'nothing in range is infinity, not scan_range_max - 0.1'),
 )
 BY_NAME = {setting.name: setting for setting in TABLE}
 
@@ -239,14 +262,40 @@ class Settings:
     imu_x: float
     imu_y: float
     gravity: float
+    publish_map_tf: bool
+    map_frame: str
+    scan: str
+    map_file: str
+    map_topic: str
+    map_occupied: int
+    scan_topic: str
+    scan_frame: str
+    publish_scan_tf: bool
+    scan_rate: float
+    scan_x: float
+    scan_y: float
+    scan_heading: float
+    scan_angle_min: float
+    scan_angle_max: float
+    scan_angle_increment: float
+    scan_range_min: float
+    scan_range_max: float
+    scan_stddev: float
+    scan_use_inf: bool
 
     def __post_init__(self) -> None:
         """Check every value, and those that hang together."""
         for field in fields(self):
             value = BY_NAME[field.name].checked(getattr(self, field.name))
             object.__setattr__(self, field.name, value)
-        for name in ('joint_states_rate', 'imu_rate'):
+        for name in ('joint_states_rate', 'imu_rate', *(
+                ['scan_rate'] if self.scan != 'none' else [])):
             self.every(name)
+        for low, high in (('scan_angle_min', 'scan_angle_max'),
+                          ('scan_range_min', 'scan_range_max')):
+            if getattr(self, low) >= getattr(self, high):
+                raise SettingsError(f'{low} = {getattr(self, low):g} must be below {high} = '
+                                    f'{getattr(self, high):g}')
 
     @property
     def period(self) -> float:

@@ -15,6 +15,7 @@ from lg_husky_sim.ros.clockwork import Clockwork
 from lg_husky_sim.ros.control import Control
 from lg_husky_sim.ros.diagnostics import Diagnostics
 from lg_husky_sim.ros.engine import Engine, Reading
+from lg_husky_sim.ros.navigation import Navigation
 from lg_husky_sim.ros.neighbours import announce, Neighbours
 from lg_husky_sim.ros.outputs import Outputs
 from lg_husky_sim.ros.parameters import declare_settings, LiveSettings
@@ -62,6 +63,7 @@ class SimNode(Node):
         self.settings = declare_settings(self)
         self.engine = Engine(self.settings)
         self.outputs = Outputs(self, self.settings)
+        self.navigation = Navigation(self, self.settings)
         self.diagnostics: Diagnostics | None = None
         if self.settings.publish_diagnostics:
             self.diagnostics = Diagnostics(self)
@@ -126,15 +128,18 @@ class SimNode(Node):
         self._on_twist(msg.twist)
 
     def _on_initial_pose(self, msg: Any) -> None:
-        frame = msg.header.frame_id
+        one, frame = self.settings, msg.header.frame_id
         pose = conversions.pose_from_msg(msg.pose.pose)
-        if frame not in ('', 'map', self.settings.odom_frame):
+        known = (one.map_frame,) if one.publish_map_tf else (one.map_frame, one.odom_frame)
+        if frame not in ('', *known):
             self.get_logger().warning(
-                f'initial pose ignored: frame {frame!r} is neither {self.settings.odom_frame!r} '
-                "nor 'map'", throttle_duration_sec=1.0)
+                f'initial pose ignored: frame {frame!r} is not {" or ".join(map(repr, known))}',
+                throttle_duration_sec=1.0)
         elif not all(math.isfinite(v) for v in (pose.x, pose.y, pose.heading)):
             self.get_logger().warning('initial pose refused: not finite',
                                       throttle_duration_sec=1.0)
+        elif one.publish_map_tf:
+            self.navigation.correct(pose)
         else:
             self._restart(pose, time=False)
 
@@ -224,6 +229,7 @@ class SimNode(Node):
     def _publish(self) -> None:
         stamp = self._stamp() if self._timer is not None else self._now_stamp()
         self.outputs.publish(self.engine.reading, stamp)
+        self.navigation.publish(self.engine.reading, stamp)
 
     # --- control ----------------------------------------------------------------------------
 
@@ -256,6 +262,7 @@ class SimNode(Node):
 
     def reset(self, *, time: bool) -> None:
         """Go to the initial pose at rest; optionally begin simulated time anew."""
+        self.navigation.forget()
         self._restart(None, time=time)
 
     def reset_clock(self) -> None:
@@ -315,6 +322,7 @@ class SimNode(Node):
         self.engine.configure(settings)
         self.settings = settings
         self.outputs.configure(settings)
+        self.navigation.configure(settings)
         if settings.speed != before.speed:
             self._resume()
         if settings.model != before.model:

@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 
+from lg_husky_sim.ros.engine import Engine
+from lg_husky_sim.ros.settings import make_settings
 import pytest
 
 if find_spec('rclpy') is None and (
@@ -21,6 +23,12 @@ elif find_spec('rclpy') is not None:
 
 if find_spec('rclpy') is not None or find_spec('cyclonedds') is not None:
     from lg_husky_sim.testing.live import LiveHusky, Probe, probed_domain
+
+
+@pytest.fixture(scope='session', autouse=True)
+def machine_code() -> None:
+    """Compile once: 7 s of processor, which each node would need by itself, all at a time."""
+    Engine(make_settings()).step()
 
 
 @pytest.fixture(scope='module')
