@@ -160,7 +160,9 @@ def _electrical(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         }
         law, coefficients, of = rows[effect.id]
         network = network.with_voltage(effect.id, number, LawRow(law, coefficients), of)
-    return network
+    # What the pack's own voltage shows.
+    shown = {'battery_sag': ('bus_resistance',), 'battery_droop': ('droop_rate', 'droop_floor')}
+    return network.changing(sensors={name: name for name in shown.get(effect.id, ())})
 
 
 def _drivetrain(network: EditedNetwork, effect: Effect) -> EditedNetwork:

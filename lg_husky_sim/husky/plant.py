@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
+import math
 
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.signals import FloatArray, TimeSeries
@@ -61,6 +62,10 @@ class SensorModel:
         Factors on the yaw rate and the wheel rates.
     delay_wheels, delay_imu, delay_pose : float
         How late the stamps of a stream are [s].
+    bus_resistance : float
+        Of the pack and its wires [Ω].
+    droop_rate, droop_floor : float
+        Share of the voltage that is lost per second [1/s], and the most that is lost.
     """
 
     gyro_bias: float = 0.0
@@ -70,6 +75,27 @@ class SensorModel:
     delay_wheels: float = 0.0
     delay_imu: float = 0.0
     delay_pose: float = 0.0
+    bus_resistance: float = 0.0
+    droop_rate: float = 0.0
+    droop_floor: float = 0.0
+
+    def battery_voltage(self, supply: float, power: float, time: float) -> float:
+        """
+        Return the voltage of the pack, as the motors' drivers get it.
+
+        Parameters
+        ----------
+        supply : float
+            Without load, at the start [V].
+        power : float
+            That the motors take [W].
+        time : float
+            Since the start [s].
+        """
+        idle = supply * (1.0 - min(self.droop_rate * time, self.droop_floor))
+        # V = idle - R I with V I = power.
+        return 0.5 * (idle + math.sqrt(max(
+            idle * idle - 4.0 * self.bus_resistance * power, 0.0)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from lg_husky_sim.errors import LgHuskyError, SettingsError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model, ModelFile
-from lg_husky_sim.ros.sensors import Measured, Sensors
+from lg_husky_sim.ros.sensors import Measured, sensor_model, Sensors
 from lg_husky_sim.ros.settings import Settings
 from lg_husky_sim.ros.wheel_odometry import WheelOdometry
 from lg_husky_sim.signals import BodyTwist, Pose
@@ -207,12 +207,15 @@ class Engine:
         self._odometry.update(self._angles[0] - left, self._angles[1] - right, one.period)
         left, right = state.currents
         v_left, v_right = state.voltages
+        power = v_left * left + v_right * right
+        voltage = sensor_model(self._simulator.plant, state).battery_voltage(
+            self._supply, power, state.time)
         return Reading(
             self.step_count, self.step_count * one.period, state.pose, state.twist,
             self._odometry.pose, self._odometry.twist, measured,
-            (self._torque * left, self._torque * right), self._supply,
+            (self._torque * left, self._torque * right), voltage,
             # Not −0.0 at rest.
-            0.0 - (v_left * left + v_right * right) / self._supply)
+            0.0 - power / voltage)
 
     def reset(self, pose: Pose | None = None, *, time: bool = False,
               twist: BodyTwist | None = None) -> Reading:
