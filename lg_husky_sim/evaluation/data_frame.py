@@ -83,6 +83,10 @@ def _slice(*arguments: int) -> slice:
 
 _ALLOWED: Mapping[tuple[str, str], Any] = {
     ('pandas.core.frame', 'DataFrame'): _Frame,
+    # pandas 3 says whole names by the package.
+    ('pandas', 'DataFrame'): _Frame,
+    ('pandas', 'Index'): _Kept,
+    ('pandas', 'RangeIndex'): _Kept,
     ('pandas.core.internals.managers', 'BlockManager'): _Kept,
     ('pandas._libs.internals', '_unpickle_block'): _block,
     ('pandas.core.internals.blocks', 'new_block'): _block,
@@ -123,7 +127,7 @@ def read_columns(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     Parameters
     ----------
     path : path-like
-        Written by ``DataFrame.to_pickle`` of pandas 1.x or 2.x, not compressed.
+        Written by ``DataFrame.to_pickle`` of pandas 1 to 3, not compressed; texts as objects.
 
     Returns
     -------

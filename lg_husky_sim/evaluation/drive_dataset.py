@@ -20,6 +20,7 @@ from lg_husky_sim.errors import RecordingError, SettingsError
 from lg_husky_sim.evaluation.data_frame import numbers, read_columns
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import FloatArray, TimeSeries
+from lg_husky_sim.yaml_files import shown
 import numpy as np
 from numpy.typing import NDArray
 import yaml
@@ -108,8 +109,7 @@ def _raw(columns: Mapping[str, NDArray[Any]]) -> DriveRun:
         if name not in columns:
             raise RecordingError(f'the run has no column {name}')
         return numbers(columns[name][driven], name)
-    stamps = np.array([int(float(text)) if '.' in str(text) else int(text)
-                       for text in columns['ros_time'][driven]], dtype=np.int64)
+    stamps = np.array([_stamp(text) for text in columns['ros_time'][driven]], dtype=np.int64)
     order = np.argsort(stamps, kind='stable')
     stamps = stamps[order]
     start = int(stamps[0])
@@ -133,6 +133,16 @@ def _raw(columns: Mapping[str, NDArray[Any]]) -> DriveRun:
         volts = group('left_wheel_voltage', 'right_wheel_voltage').mean(axis=1)
         streams['voltage'] = _changes(times, volts[:, None], ('bus',))
     return DriveRun(streams, start)
+
+
+def _stamp(text: Any) -> int:
+    try:
+        stamp = int(float(text)) if '.' in str(text) else int(text)
+    except (ValueError, OverflowError, TypeError):
+        stamp = -1
+    if not 0 <= stamp < 2 ** 63:
+        raise RecordingError(f'ros_time {shown(text)} is no stamp in nanoseconds')
+    return stamp
 
 
 def _yaw(quaternion: FloatArray) -> FloatArray:

@@ -206,7 +206,8 @@ def read_map(file: str, occupied: int) -> OccupancyMap:
     """
     try:
         return _read_map(Path(file), occupied)
-    except (SettingsError, OSError) as error:
+    except (SettingsError, OSError, OverflowError, ValueError) as error:
+        # A number without end, or a path with a zero in it.
         raise SettingsError(f'map_file = {file!r} cannot be used: {error}') from error
 
 

@@ -225,13 +225,15 @@ class LiveHusky:
         Raises
         ------
         SettingsError
-            With the node's log, if none comes.
+            With the node's log, if none comes; the node is ended then.
 
         """
         def over() -> bool:
             return bool(received) or self.node.process.poll() is not None
         self.probe.until(over, timeout)
         if not received:
+            # Whoever fails here has nobody yet who would end it, and others would hear it.
+            self.node.stop(signal.SIGTERM)
             raise SettingsError(f'the node does not come up: {self.node.log()}')
 
 

@@ -190,6 +190,16 @@ def test_other_files_are_refused_in_one_line(tmp_path: Path, content: bytes) -> 
     assert '\n' not in str(caught.value)
 
 
+@pytest.mark.parametrize('stamp', ['10\x10', 'inf', '1.5.2', '-5', '9' * 30, ''])
+def test_a_stamp_that_is_none_is_shown(
+        pandas: types.SimpleNamespace, tmp_path: Path, stamp: str) -> None:
+    columns = raw()
+    columns['ros_time'][100] = stamp
+    path = write(pandas, tmp_path / 'raw_dataframe.pkl', columns)
+    with pytest.raises(RecordingError, match='is no stamp in nanoseconds'):
+        read_drive(path)
+
+
 def test_missing_columns_and_robots_are_named(pandas: types.SimpleNamespace, tmp_path: Path
                                               ) -> None:
     columns = raw()

@@ -14,7 +14,7 @@ import pytest
 if find_spec('rclpy') is None and (
         find_spec('cyclonedds') is None or find_spec('rosbags') is None):
     collect_ignore_glob = ['test_contract*', 'test_conversions*', 'embedded/*', 'test_demo*',
-                           'test_golden*']
+                           'test_golden*', 'test_live*', 'test_occupancy*']
 elif find_spec('rclpy') is not None:
     # Not skipped inside the files: ROS' launch_testing imports them by itself and would end the
     # collection of the whole folder there.

@@ -45,10 +45,13 @@ class Graph:
         self.pose, self.pose_type = probe.talk(
             'geometry_msgs/msg/PoseWithCovarianceStamped', '/initialpose')
         self.husky = LiveHusky(probe)
+
+    def ready(self) -> None:
+        """Wait until the node hears and is heard."""
         self.husky.ready(self.odom)
         talkers = (self.command, self.pause, self.reset, self.step, self.speed, self.pose)
-        assert probe.until(lambda: all(t.get_subscription_count() for t in talkers))
-        assert probe.until(lambda: len(self.odom) > 5)
+        assert self.probe.until(lambda: all(t.get_subscription_count() for t in talkers))
+        assert self.probe.until(lambda: len(self.odom) > 5)
 
     def send(self, forward: float, yaw: float, seconds: float = 0.0) -> None:
         """Send a command once, or at 20 Hz for some time."""
@@ -75,8 +78,12 @@ class Graph:
 def graph(probe: Probe) -> Iterator[Graph]:
     """Start one node for the module; its exit code is checked at the end."""
     one = Graph(probe)
-    yield one
-    assert one.husky.node.stop() == 0, one.husky.node.log()
+    try:
+        one.ready()
+        yield one
+    finally:
+        code = one.husky.node.stop()
+    assert code == 0, one.husky.node.log()
 
 
 @pytest.fixture(autouse=True)

@@ -114,6 +114,8 @@ def test_modes_of_map_server(tmp_path: Path, more: str, cells: list[list[int]]) 
     (b'P5 1 1 255\n\0', HEAD.replace('[-1.0', '[x'), "origin = ['x'"),
     (b'P5 1 1 255\n\0', HEAD + 'mode: other\n', "mode = 'other' is not allowed: trinary, scale"),
     (b'P5 1 1 255\n\0', HEAD + 'free_thresh: 0.7\n', 'free_thresh = 0.7 is not below'),
+    (b'P5 1 1 255\n\0', HEAD.replace('[-1.0', '[1' + '0' * 400), 'int too large'),
+    (b'P5 1 1 255\n\0', HEAD.replace('map.pgm', '"\\0"'), 'null'),
     (b'P5 999999 999999 255\n\0', HEAD, 'cannot be used')])
 def test_a_file_that_cannot_be_used_is_refused_in_one_line(
         tmp_path: Path, image: bytes, text: str, message: str) -> None:
