@@ -65,8 +65,9 @@ class Events:
         self.start = start
         ordered = bool(np.all(wanted[1:] >= wanted[:-1]))
         self.order = None if ordered else np.argsort(wanted, kind='stable')
-        #: Sorted times [s].
+        #: Sorted times [s], and where each stood.
         self.times = wanted if self.order is None else wanted[self.order]
+        self.places = np.arange(wanted.size) if self.order is None else self.order
         self.end = float(self.times[-1]) if wanted.size else start
         stamps = np.array(commands.times)
         values = np.column_stack([commands.column('forward'), commands.column('yaw')])
@@ -123,13 +124,9 @@ class Propagator:
         flat = np.array(initial)
         flat[len(self.plant.states) + 6] = events.start
         out = np.empty((events.times.size, len(COLUMNS)))
-        run_kernel(flat, events.stamps, events.values, events.times, out, events.end,
-                   fine_pose, self._packed)
-        if events.order is None:
-            return out
-        given = np.empty_like(out)
-        given[events.order] = out
-        return given
+        run_kernel(flat, events.stamps, events.values, events.times, events.places, out,
+                   events.end, fine_pose, self._packed)
+        return out
 
 
 def run(plant: Plant, events: Events, initial: FloatArray) -> FloatArray:

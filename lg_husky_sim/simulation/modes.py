@@ -184,8 +184,7 @@ def packed(plant: Plant) -> Packed:
     size = -(-max(mode.rates.size for mode in modes) // _LANES) * _LANES
     efforts = max(one.laws.size for one in sets)
     arguments = max(one.h.shape[0] for one in sets)
-    wide = -(-ROWS // _LANES) * _LANES
-    stacks: list[list[NDArray[np.generic]]] = [[] for _ in range(17)]
+    stacks: list[list[NDArray[np.generic]]] = [[] for _ in range(15)]
     for one, mode in zip(sets, modes, strict=True):
         rows, rows_u, rows_f = _rows(one)
         needs = (bool(np.any(np.isin(one.laws, _CONTEXTUAL))),
@@ -198,9 +197,9 @@ def packed(plant: Plant) -> Packed:
             _padded((mode.into @ one.g).T, (efforts, size)),
             _padded((one.h @ mode.out_of).T, (size, arguments)),
             _padded(one.k.T, (2, arguments)),
-            _padded(mode.out_of.T @ rows, (size, wide)),
-            _padded(rows_u, (2, wide)), _padded(rows_f, (efforts, wide)),
-            _padded(mode.out_of.T @ rows[:, :4], (size, _LANES)),
+            np.hstack([(mode.out_of.T @ rows).T, rows_u.T,
+                       _padded(rows_f.T, (ROWS, efforts))]),
+            np.ascontiguousarray((mode.out_of.T @ rows[:, :4]).T),
             # What pads a set reads no argument: there may be none in the whole plant.
             _padded(one.laws, (efforts,), int(Law.HEADING)),
             _padded(one.coefficients, (efforts, WIDTH)), _padded(one.offsets, (efforts,)),
