@@ -147,13 +147,13 @@ def spoken(*, page: bool = False, data: bool = True) -> Callable[[Function], Fun
         options = [
             click.option('-q', '--quiet', is_flag=True, help='Print the result only.'),
             click.option('-v', '--verbose', is_flag=True,
-                         help='Print one line for each stage, and where an error comes from.')]
+                         help='Print one line per stage, and where an error comes from.')]
         if data:
             options.append(click.option('--json', 'as_json', is_flag=True,
                                         help='Print the result as JSON.'))
         if page:
             options.append(click.option('--open', 'opened', is_flag=True,
-                                        help='Open the page when it is written.'))
+                                        help='Open the page once it is written.'))
         for option in reversed(options):
             wrapped = option(wrapped)
         return wrapped  # type: ignore[return-value]

@@ -22,7 +22,7 @@ from lg_husky_sim.cli.several import SeveralWords
                short_help='Replay recordings through models; figures and errors.')
 @click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]', type=RECORDING)
 @click.option('--model', 'models', multiple=True, type=MODEL, metavar='FILE.yaml',
-              help="Model file; several stand side by side. The Husky with the paper's "
+              help="Model file; several are shown side by side. The Husky with the paper's "
                    'parameters by default, which is also called paper.')
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='DIR',
               help='Folder for index.html, compare.json, compare.txt and the pictures.')
@@ -32,8 +32,8 @@ from lg_husky_sim.cli.several import SeveralWords
 @settings_option
 @topics_option
 @click.option('--horizon', type=float, default=0.0, metavar='SECONDS',
-              help='Start anew from the measured state after so many seconds; by default only '
-                   'at gaps.')
+              help='Restart from the measured state every so many seconds; by default only at '
+                   'gaps.')
 @click.option('--figures', 'most', type=click.IntRange(min=0), default=6, show_default=True,
               metavar='N',
               help='Recordings whose signals and path are drawn as PNG too, the first ones.')
@@ -49,7 +49,7 @@ def command(
     bag: Path | None, trajectories: Path | None, say: Output,
 ) -> None:
     """
-    Replay the commands of recordings through models and show how far they are apart.
+    Replay the commands of recordings through models and show how far the models are off.
 
     Each segment without a gap starts in the state that the robot was in. DIR gets the paper's
     figures (responses; trajectory and tracking error), the root mean square error of each

@@ -23,7 +23,7 @@ MARKER = 'summary.txt'
               help='Model file of the node, such as identify and diagnose write them.')
 def command(out: Path, manoeuvre: str, model: str) -> None:
     """
-    Start the node, send it a manoeuvre from another process, record and draw what comes out.
+    Start the node, send it a manoeuvre from another process, record it and draw the result.
 
     Everything stays on this machine, in a ROS domain of its own, unless ROS_DOMAIN_ID and
     ROS_AUTOMATIC_DISCOVERY_RANGE say otherwise.

@@ -21,7 +21,7 @@ PAPER = ('simplified', 'expanded')
               metavar='simplified|expanded|FILE.yaml', type=Words(lambda: PAPER, files=True),
               help="One of the paper's two graphs of the Husky, a netlist, or a model file.")
 @click.option('--output', 'outputs', multiple=True, metavar='VARIABLE',
-              help="A variable to put out, such as 'i(L_1)'; may be given several times.")
+              help="An output variable, such as 'i(L_1)'; may be given several times.")
 @click.option('--parameters', 'by_parameter', is_flag=True,
               help="Write the parameters' expressions instead of the elements' names.")
 @click.option('--latex', is_flag=True, help='Write LaTeX instead of plain text.')
@@ -35,11 +35,11 @@ PAPER = ('simplified', 'expanded')
 def command(model: str, outputs: tuple[str, ...], by_parameter: bool, latex: bool,
             picture: Path | None, exports: tuple[Path, ...], say: Output) -> None:
     """
-    Derive the state-space model of a linear graph and write down every step.
+    Derive the state-space model of a linear graph and show every step.
 
-    Normal tree, continuity, compatibility and constitutive equations, then A, B, C and D (E and
-    F where an input is differentiated, G, H and K where laws are not linear), and with numbers
-    the matrices and the poles.
+    Normal tree, continuity, compatibility and constitutive equations, then A, B, C and D (E and F
+    if an input is differentiated, G, H and K if laws are not linear), and, given numbers, numeric
+    matrices and poles.
     """
     import json
 

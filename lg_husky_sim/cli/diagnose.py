@@ -31,7 +31,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @settings_option
 @topics_option
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
-              help='Kept for reproducible scripts: the search itself draws nothing by chance.')
+              help='Kept for old scripts: the search uses no random numbers.')
 @click.option('--jobs', type=click.IntRange(min=1), default=None, metavar='N',
               help='Threads to use; as many as there are cores by default.')
 @click.option('--report/--no-report', 'with_report', default=True, show_default=True,
@@ -43,7 +43,7 @@ def command(
     with_report: bool, say: Output,
 ) -> None:
     """
-    Say what physics a model lacks, where it shows, and how much better it gets with it.
+    Find the physics that a model lacks, where it shows, and how much it improves the fit.
 
     The model is recalibrated first, within the tolerances of its parameters. What is left is
     compared with every effect of the catalogue; one is adopted only if it explains more than

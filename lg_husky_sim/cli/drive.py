@@ -24,9 +24,9 @@ def command(manoeuvre: str, preset: str | None, namespace: str | None, topic: st
     """
     Send a built-in manoeuvre (circle, s_bend, obstacle, …) or one from a file, in real time.
 
-    A real Husky moves as well when it listens in this ROS domain: look before you drive. What
-    listens is said first, commands stay within the limits of the preset, and whichever way it
-    ends (done, Ctrl-C, an error, a signal), zero commands go out last.
+    A real Husky that listens in this ROS domain moves too: look before you drive. The nodes
+    that listen are printed first, commands stay within the limits of the preset, and zero commands
+    are sent last, however it ends (done, Ctrl-C, an error, a signal).
     """
     from lg_husky_sim.manoeuvres import find_manoeuvre, load_manoeuvre
     from lg_husky_sim.ros.driver import drive, NAME

@@ -45,9 +45,10 @@ from lg_husky_sim.cli.several import SeveralWords
                    'the state at the start of every segment that begins in motion.')
 @click.option('--profile', multiple=True, metavar='NAMES', type=PARAMETERS,
               help='Parameters to give a likelihood profile, separated by commas: intervals '
-                   'that hold for bent likelihoods too, at the price of more simulations.')
+                   'that hold for non-quadratic likelihoods too, at the cost of more '
+                   'simulations.')
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
-              help='Seed of all chance: starts, genes, noise.')
+              help='Seed of all random numbers: starts, genes, noise.')
 @click.option('--starts', type=click.IntRange(min=1), default=6, show_default=True,
               help='Starts of the least squares.')
 @click.option('--jobs', type=click.IntRange(min=1), default=1, show_default=True,
@@ -67,9 +68,9 @@ def command(
     """
     Estimate the parameters of a model from recordings.
 
-    The model file can be read by sim_node, simulate and compare. The report says how far the
-    parameters are known, and which of them the recordings cannot tell apart. A folder stands for
-    all bags in it.
+    The model file can be read by sim_node, simulate and compare. The report says how well each
+    parameter is determined, and which of them the recordings cannot tell apart. A folder stands
+    for all bags in it.
     """
     from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.husky.model_file import parse_settings

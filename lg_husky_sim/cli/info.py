@@ -19,7 +19,7 @@ from lg_husky_sim.cli.several import SeveralWords
 
 
 @click.command(cls=SeveralWords,
-               short_help='Say what recordings hold and are good for, before any fit.')
+               short_help='Show what recordings contain and are good for, before any fit.')
 @click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]', type=RECORDING)
 @model_option('--model')
 @settings_option
@@ -28,11 +28,11 @@ from lg_husky_sim.cli.several import SeveralWords
 def command(recordings: tuple[str, ...], model: Path | None, settings: tuple[str, ...],
             topics: tuple[str, ...], say: Output) -> None:
     """
-    Say what recordings hold and what they are good for, before any fit.
+    Show what recordings contain and what they are good for, before any fit.
 
-    The streams found, their rates and gaps, what had to be repaired, what was driven, how well
-    the drive can determine the model's parameters, whether the wheels stood on the ground and
-    whether the robot is a Husky; and what a diagnosis lacks. A folder stands for all bags in it.
+    The streams found, their rates and gaps, what had to be repaired, what was driven, how well the
+    drive can determine the model's parameters, whether the wheels were on the ground and whether
+    the robot is a Husky; and what is missing for a diagnosis. A folder stands for all bags in it.
     """
     from lg_husky_sim.api.recordings import read_all
     from lg_husky_sim.api.robots import Husky

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 def command(folder: Path | None, effects: str | None, robot: Path | None, out: Path,
             max_speed: float, max_yaw: float) -> None:
     """
-    Say which drive tells the first two explanations of a diagnosis apart, and write it.
+    Write the drive that best tells the first two explanations of a diagnosis apart.
 
     DIR is the folder of a diagnosis. Each explanation is simulated on a list of drives and
     the other one refitted to it; the drive on which neither can imitate the other wins.

@@ -16,7 +16,7 @@ from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, Ro
 @click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
               help='Choose a topic of the recording by hand (command=/cmd_vel, …).')
 @click.option('--speed', default=1.0, show_default=True, type=click.FloatRange(0.01, 100.0),
-              help='How many times as fast as it was recorded.')
+              help='Speed of playing, as a multiple of the recorded one.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
               type=click.FloatRange(min=0.0), help='How long to wait for a listener.')
 def command(recording: Path, preset: str | None, namespace: str | None, topics: tuple[str, ...],
@@ -24,9 +24,9 @@ def command(recording: Path, preset: str | None, namespace: str | None, topics: 
     """
     Send command, joint states, IMU and odometry of a recording, stamped now.
 
-    A real Husky moves when it listens to the command topic in this ROS domain: look before you
-    play. What listens is said first, commands stay within the limits of the preset, and
-    whichever way it ends, zero commands go out last.
+    A real Husky that listens to the command topic in this ROS domain moves: look before you play.
+    The nodes that listen are printed first, commands stay within the limits of the preset, and
+    zero commands are sent last, however it ends.
     """
     from lg_husky_sim.recording import read_recording, TopicMap
     from lg_husky_sim.ros.player import NAME, play

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
               help='Folder of the trial; the same call resumes an interrupted one.')
 @click.option('--given', type=click.Path(path_type=Path, exists=True, file_okay=False),
               metavar='DIR', help='Cases that somebody else made (DIR/cases, DIR/answers) '
-                                  'instead of our own.')
+                                  'instead of generated ones.')
 @click.option('--held-out/--no-held-out', default=True,
               help='Measure the share of the achievable improvement on drives not shown.')
 @click.option('--generate-only', is_flag=True, help='Make and seal the cases; diagnose nothing.')
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
               help='Score the cases that are diagnosed already; diagnose nothing.')
 @click.option('--from', 'sources', multiple=True, metavar='FILE.jsonl',
               type=click.Path(path_type=Path, exists=True, dir_okay=False),
-              help='Outcomes of earlier trials: make tables and page from them, drive nothing.')
+              help='Outcomes of earlier trials: make tables and page from them; simulate nothing.')
 @click.option('--page', type=click.Path(path_type=Path), metavar='FILE.md',
               help='Also write the results as a page, with pictures and outcomes beside it.')
 def command(

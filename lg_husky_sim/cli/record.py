@@ -17,7 +17,7 @@ from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, Ro
 @click.option('--storage', type=click.Choice(['mcap', 'sqlite3']), default='mcap',
               show_default=True, help='Storage of the rosbag2.')
 @click.option('--seconds', type=click.FloatRange(min=0.0, min_open=True), metavar='SECONDS',
-              help='End by itself after so long; by default Ctrl-C ends it.')
+              help='Stop after this time; by default only on Ctrl-C.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
               type=click.FloatRange(min=0.0), help='How long to look for a Husky.')
 def command(bag: Path, preset: str | None, namespace: str | None, storage: str,
@@ -25,7 +25,7 @@ def command(bag: Path, preset: str | None, namespace: str | None, storage: str,
     """
     Record command, odometry, joint states, IMU, battery and transforms into the folder BAG.
 
-    The bag is on disk while it grows: a process that is killed loses at most its last second.
+    The bag is written as it grows: a process that is killed loses at most its last second.
     """
     from lg_husky_sim.ros.recorder import NAME, record
 

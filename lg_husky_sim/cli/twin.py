@@ -25,12 +25,13 @@ if TYPE_CHECKING:
               help="Model to compare with; the Husky with the paper's parameters by default.")
 @robot_options
 @click.option('--seconds', type=click.FloatRange(min=0.0, min_open=True), metavar='SECONDS',
-              help='End by itself after so long; by default Ctrl-C ends it.')
+              help='Stop after this time; by default only on Ctrl-C.')
 @click.option('--every', default=1.0, show_default=True, metavar='SECONDS',
-              type=click.FloatRange(min=0.05), help='Time between two lines and publications.')
+              type=click.FloatRange(min=0.05),
+              help='Time between two printed lines, and between two publications.')
 @click.option('--pose-topic', metavar='TOPIC',
-              help='Odometry that tells where the robot really is (filtered, ground truth): the '
-              'models are kept there.')
+              help='Odometry that tells where the robot really is (filtered, ground truth); the '
+              'models are held to it.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
               type=click.FloatRange(min=0.0), help='How long to look for a Husky.')
 def command(model: Path, plain: Path | None, preset: str | None, namespace: str | None,
@@ -41,8 +42,8 @@ def command(model: Path, plain: Path | None, preset: str | None, namespace: str 
     The running errors (root mean square, the last 10 s) are printed and published as
     std_msgs/Float64 on twin/plain/wheel_rate_error, twin/model/yaw_rate_error, …; for plots
     (layout config/twin.foxglove.json), twin/measured and twin/model/reading are published at each
-    stamp. The models begin at the robot's wheel angles and heading, apply delays, sensor faults
-    and onsets that were found, and follow the clock of its stamps. The robot may as well be
+    stamp. The models start at the robot's wheel angles and heading, apply the delays, sensor
+    faults and onsets that were found, and follow the clock of its stamps. The robot may as well be
     `lg_husky play REC` or another simulator.
     """
     from lg_husky_sim.husky.model import compile_model
