@@ -161,6 +161,9 @@ def worker(reader: Reader, seed: int, first: int, inputs: int, seconds: float, o
     """Try inputs until they or the time are used up; say the number of each before it."""
     signal.signal(signal.SIGVTALRM, _too_long)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # Beyond what counts as a failure; the machine has others to serve.
+    most = round((LARGEST + 2000.0) * 1e6)
+    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
     tally, number = Tally(), first
     folder, seeds = prepared(reader)
     before = _peak()

@@ -4,17 +4,22 @@
 Read the columns of a pickled table without trusting the file and without pandas.
 
 A pickle is a program. Here it may name a closed list of classes and functions, and each of them
-is a stand-in of ours that only keeps its arguments; NumPy's own arrays and dtypes are the sole
-exception. Anything else is refused before it is called.
+is a stand-in of ours that only keeps its arguments, NumPy's arrays and dtypes too: what a damaged
+file says of their insides ends the process. Anything else is refused before it is called. The
+reader is the one in plain Python: the one in C takes memory for the largest number in the file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+import io
+import math
 import os
 from pathlib import Path
 import pickle
-from typing import Any
+import struct
+import sys
+from typing import Any, ClassVar
 
 from lg_husky_sim.errors import RecordingError
 import numpy as np
@@ -39,20 +44,76 @@ class _Frame(_Kept):
     pass
 
 
-def _empty(kind: Any, shape: Any, code: Any) -> NDArray[Any]:
+class _Dtype:
+    # Stand-in of numpy.dtype: a name and a byte order, nothing else of its state.
+    def __init__(self, name: Any, *rest: Any) -> None:
+        self._name, self._swapped = str(name), False
+
+    def __setstate__(self, state: Any) -> None:
+        if state[1] not in ('<', '>', '=', '|') or any(part is not None for part in state[2:5]):
+            raise RecordingError('the pickle describes a dtype that is not one of numbers')
+        self._swapped = state[1] == {'little': '>', 'big': '<'}[sys.byteorder]
+
+    def made(self) -> np.dtype[Any]:
+        """Return the dtype."""
+        dtype = np.dtype(self._name)
+        if dtype.kind not in 'biufO' or dtype.hasobject != (dtype.kind == 'O'):
+            raise RecordingError(f'the pickle holds {dtype}, not numbers and texts')
+        return dtype.newbyteorder('S') if self._swapped else dtype
+
+
+class _Ndarray:
+    # Stands for numpy.ndarray where it is named; not to be called.
+    def __init__(self, *arguments: Any) -> None:
+        raise RecordingError('the pickle builds an array by hand')
+
+
+class _Array:
+    """Stand-in of an array: its values, made once its shape and their number agree."""
+
+    def __init__(self) -> None:
+        self.values: NDArray[Any] = np.empty(0)
+
+    def __setstate__(self, state: Any) -> None:
+        _, shape, dtype, fortran, raw = state
+        self.values = _array(raw, dtype, shape, 'F' if fortran else 'C')
+
+
+def _array(raw: Any, dtype: Any, shape: Any, order: str) -> NDArray[Any]:
+    if not isinstance(dtype, _Dtype) or not isinstance(shape, tuple) or not all(
+            isinstance(size, int) and size >= 0 for size in shape):
+        raise RecordingError('the pickle holds an array without shape or dtype')
+    count, kind = math.prod(shape), dtype.made()
+    made: NDArray[Any]
+    if kind.kind == 'O':
+        if not isinstance(raw, list) or len(raw) != count:
+            raise RecordingError('the pickle holds an array of another size than its shape')
+        made = np.empty(count, dtype=object)
+        for place, cell in enumerate(raw):
+            made[place] = cell
+    else:
+        if not isinstance(raw, (bytes, bytearray)) or len(raw) != count * kind.itemsize:
+            raise RecordingError('the pickle holds an array of another size than its shape')
+        made = np.frombuffer(bytes(raw), dtype=kind)
+    return made.reshape(shape, order='F' if order == 'F' else 'C')
+
+
+def _empty(kind: Any, shape: Any, code: Any) -> _Array:
     # Stand-in of numpy's _reconstruct: an array that __setstate__ will fill.
-    if kind is not np.ndarray:
+    if kind is not _Ndarray:
         raise RecordingError('the pickle builds an array of a kind that is not numpy.ndarray')
-    made: NDArray[Any] = np.ndarray((0,), dtype='b')
-    return made
+    return _Array()
 
 
 def _from_buffer(buffer: Any, dtype: Any, shape: Any, order: Any, *rest: Any) -> NDArray[Any]:
-    return np.frombuffer(bytes(buffer), dtype=dtype).reshape(shape, order=order)
+    return _array(bytes(buffer), dtype, shape, order)
 
 
-def _dtype(*arguments: Any) -> np.dtype[Any]:
-    return np.dtype(str(arguments[0]))
+def _values(array: Any) -> NDArray[Any]:
+    values = array.values if isinstance(array, _Array) else array
+    if not isinstance(values, np.ndarray):
+        raise RecordingError('the pickle holds something else where an array should be')
+    return values
 
 
 def _index(kind: Any, state: Any) -> Any:
@@ -99,14 +160,36 @@ _ALLOWED: Mapping[tuple[str, str], Any] = {
     ('numpy._core.multiarray', '_reconstruct'): _empty,
     ('numpy.core.numeric', '_frombuffer'): _from_buffer,
     ('numpy._core.numeric', '_frombuffer'): _from_buffer,
-    ('numpy', 'ndarray'): np.ndarray,
-    ('numpy', 'dtype'): _dtype,
+    ('numpy', 'ndarray'): _Ndarray,
+    ('numpy', 'dtype'): _Dtype,
     ('builtins', 'slice'): _slice,
 }
 
 
-class _Reader(pickle.Unpickler):
+_PLAIN: dict[int, Callable[[Any], None]] = dict(pickle._Unpickler.dispatch)
+
+
+class _Reader(pickle._Unpickler):
     """An unpickler that knows the names of :data:`_ALLOWED` and no others."""
+
+    stack: list[Any]
+    read: Callable[[int], bytes]
+
+    def _build(self) -> None:
+        # Stand-ins get their state; functions and classes keep theirs.
+        if not isinstance(self.stack[-2], (_Kept, _Block, _Dtype, _Array)):
+            raise RecordingError('the pickle changes something that is no table')
+        _PLAIN[pickle.BUILD[0]](self)
+
+    def _bytearray(self) -> None:
+        # The plain reader makes one as long as the file says, before it looks what is there.
+        (size,) = struct.unpack('<Q', self.read(8))
+        if size > LARGEST:
+            raise RecordingError(f'the pickle announces {size} bytes')
+        self.stack.append(bytearray(self.read(size)))
+
+    dispatch: ClassVar[dict[int, Callable[[Any], None]]] = {
+        **_PLAIN, pickle.BUILD[0]: _build, pickle.BYTEARRAY8[0]: _bytearray}
 
     def find_class(self, module_name: str, global_name: str, /) -> Any:
         try:
@@ -143,15 +226,15 @@ def read_columns(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     try:
         if place.stat().st_size > LARGEST:
             raise RecordingError(f'{place}: larger than {LARGEST} bytes')
-        with place.open('rb') as stream:
-            frame = _Reader(stream).load()
-        return _columns(frame)
+        # From memory: a file would be asked for as much as the pickle says there is.
+        return _columns(_Reader(io.BytesIO(place.read_bytes())).load())
     except RecordingError as error:
         raise RecordingError(f'{place}: {error}') from error
     except OSError as error:
         raise RecordingError(f'{place}: {error.strerror}') from error
     except (pickle.UnpicklingError, EOFError, AttributeError, ValueError, TypeError, KeyError,
-            IndexError, ImportError, MemoryError, OverflowError, RecursionError) as error:
+            IndexError, ImportError, MemoryError, OverflowError, RecursionError,
+            struct.error) as error:
         raise RecordingError(f'{place}: not a pickled table ({type(error).__name__})') from error
 
 
@@ -159,12 +242,12 @@ def _columns(frame: Any) -> dict[str, NDArray[Any]]:
     if not isinstance(frame, _Frame) or not isinstance(frame.state, dict):
         raise RecordingError('not a pickled table')
     blocks, axes = frame.state['_mgr'].arguments[:2]
-    names = [str(name) for name in axes[0]['data']]
+    names = [str(name) for name in _values(axes[0]['data'])]
     columns: dict[str, NDArray[Any]] = {}
     for values, placement in blocks:
         places: Iterable[int] = (range(len(names))[placement] if isinstance(placement, slice)
                                  else [int(p) for p in placement])
-        for place, row in zip(places, values, strict=True):
+        for place, row in zip(places, _values(values), strict=True):
             columns[names[place]] = row
     if sorted(columns) != sorted(names):
         raise RecordingError('the table lacks columns that it names')

@@ -13,12 +13,14 @@ from typing import Any
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.resources import config_path
-from lg_husky_sim.yaml_files import read_yaml
+from lg_husky_sim.yaml_files import read_yaml, shown
 
 SCHEMA = 'lg_husky_sim/presets/1'
 #: Preset of a node that is not told otherwise.
 DEFAULT_PRESET = 'paper'
 _HUGE = 1e9
+#: Whole numbers beyond it do not fit into a float.
+_LARGEST = 1e300
 
 
 @dataclass(frozen=True)
@@ -73,17 +75,17 @@ class Setting:
             If it has another type or is out of range.
 
         """
-        problem = SettingsError(f'{self.name} = {value!r} is not allowed: {self.allowed()}')
+        problem = SettingsError(f'{self.name} = {shown(value)} is not allowed: {self.allowed()}')
         if self.kind is tuple:
             return self._checked_list(value, problem)
         if self.kind is float and type(value) is int:
-            value = float(value)
+            value = float(value) if abs(value) <= _LARGEST else math.inf
         if type(value) is not self.kind:
             raise SettingsError(
-                f'{self.name} = {value!r} is {type(value).__name__}, not {self.kind.__name__}: '
-                f'{self.allowed()}')
+                f'{self.name} = {shown(value)} is {type(value).__name__}, not '
+                f'{self.kind.__name__}: {self.allowed()}')
         if isinstance(value, (int, float)) and not isinstance(value, bool) and not (
-                math.isfinite(value) and self.low <= value <= self.high):
+                self.low <= value <= self.high):
             raise problem
         if self.choices and value not in self.choices:
             raise problem
@@ -92,13 +94,13 @@ class Setting:
     def _checked_list(self, value: object, problem: SettingsError) -> tuple[Any, ...]:
         items = tuple(value) if isinstance(value, (list, tuple)) else ()
         if self.name == 'joint_names':
-            if len(items) != 4 or len(set(items)) != 4 or not all(
-                    isinstance(item, str) and item for item in items):
+            if len(items) != 4 or not all(
+                    isinstance(item, str) and item for item in items) or len(set(items)) != 4:
                 raise SettingsError(f'{problem} of four different names: front left, front '
                                     'right, rear left, rear right')
             return items
         if len(items) != 6 or not all(
-                type(item) in (int, float) and math.isfinite(item) and item > 0.0
+                type(item) in (int, float) and 0.0 < item <= _LARGEST
                 for item in items):
             raise SettingsError(f'{problem} of six positive numbers')
         return tuple(float(item) for item in items)
@@ -316,7 +318,7 @@ class Settings:
         if own == 0.0:
             return 1
         ratio = self.rate / own
-        if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-9 * ratio:
+        if not 1.0 - 1e-9 <= ratio < _HUGE or abs(ratio - round(ratio)) > 1e-9 * ratio:
             raise SettingsError(f'{name} = {own:g} Hz must be rate = {self.rate:g} Hz divided by '
                                 'a whole number')
         return round(ratio)

@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 import pickle
 import sys
+import tracemalloc
 import types
 from typing import Any
 
@@ -178,6 +179,31 @@ def test_stand_ins_do_not_prepare_other_calls(tmp_path: Path) -> None:
     path.write_bytes(pickle.dumps(Call(functools.partial, np.dtype)))
     with pytest.raises(RecordingError, match='not that of a block'):
         read_columns(path)
+
+
+@pytest.mark.parametrize(('pickled', 'message'), [
+    # 22 GB of bytes, a name with 4 billion places before it: memory for either.
+    (b'\x80\x05\x96\x00\x00\x00\x40\x05\x00\x00\x00abc.', 'announces 22548578304 bytes'),
+    (b'\x80\x04]r\xff\xff\xff\xff.', 'not a pickled table'),
+    # The insides of a dtype, as numpy itself would believe them.
+    (pickle.dumps(np.dtype([('a', 'f8')])), 'not one of numbers|not a pickled table'),
+    # An array of another size than its values, and of anything but numbers and texts.
+    (pickle.dumps(np.zeros(3)).replace(b'K\x03\x85', b'K\x7f\x85'), 'another size'),
+    (pickle.dumps(np.zeros(3, dtype='M8[s]')), 'not numbers and texts|not one of numbers'),
+    (b'\x80\x04\x8e\x01', 'not a pickled table'),
+    # The state of a function.
+    (b'\x80\x04cnumpy._core.multiarray\n_reconstruct\n}b.', 'changes something'),
+])
+def test_a_hostile_pickle_takes_no_memory_and_ends_no_process(
+        tmp_path: Path, pickled: bytes, message: str) -> None:
+    path = tmp_path / 'x.pkl'
+    path.write_bytes(pickled)
+    tracemalloc.start()
+    with pytest.raises(RecordingError, match=message):
+        read_columns(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 20_000_000
 
 
 @pytest.mark.parametrize('content', [b'', b'\x80\x05', b'text', pickle.dumps({'a': 1}),

@@ -43,6 +43,12 @@ def test_the_sample_parameter_file_holds_the_defaults() -> None:
     ({'odometry_covariance': [1.0] * 5}, 'six positive numbers'),
     ({'odometry_covariance': [1.0] * 5 + [0.0]}, 'six positive numbers'),
     ({'imu_rate': 100.0}, 'imu_rate = 100 Hz must be rate = 50 Hz divided by a whole number'),
+    ({'max_yaw': 10 ** 400}, r'max_yaw = 10+\.\.\. is not allowed: from 0 to 100 rad/s'),
+    ({'imu_rate': 1e-320}, 'imu_rate = .* Hz must be rate = 50 Hz divided by a whole number'),
+    ({'seed': 10 ** 400}, r'seed = 10+\.\.\. is not allowed: at least 0'),
+    ({'odometry_covariance': [1.0] * 5 + [10 ** 400]}, 'six positive numbers'),
+    ({'joint_names': ['a', 'b', 'c', {}]}, 'four different names'),
+    ({'preset': {}}, 'preset = {} is dict, not str'),
     ({'preset': 'husky'}, 'one of paper, husky_ros1, clearpath_jazzy'),
 ])
 def test_every_mistake_says_what_is_allowed(values: dict[str, object], message: str) -> None:
