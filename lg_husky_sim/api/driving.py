@@ -58,8 +58,12 @@ def driven(plant: Plant, values: Mapping[str, float], commands: Drive, rate: flo
     if recording is not None:
         frames = recording.frames if recording.frames[0] else ('odom', 'base_link')
         streams = simulate_recording(plant, recording, torque, rate or 0.0)
+        _, left_out = rec.driven_segments(recording)
+        notes = () if not left_out else (
+            f'{left_out} of {len(recording.stream("command"))} commands are not driven: no state '
+            'of the robot is known before they were given',)
         return Recording(recording.name, '', streams, recording.start_ns,
-                         frames=frames)
+                         frames=frames, notes=notes)
     name, series = _series(commands, topics)
     streams = simulate_commands(plant, series, torque, rate or DEFAULT_RATE)
     return Recording(name, '', streams, START_NS, frames=('odom', 'base_link'))

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from lg_husky_sim.comparison.replay import PERIOD, replay
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.recording import Recording, Segment, segments
+from lg_husky_sim.recording import driven_segments, Recording, Segment
 from lg_husky_sim.signals import FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation import rollout
 import numpy as np
@@ -33,7 +33,8 @@ def simulate_recording(
     """
     Drive a plant with a recording's commands, segment by segment.
 
-    Each segment starts in the state that the robot was in.
+    Each segment starts in the state that the robot was in, and every command from there on is
+    driven, also where the sensors fall silent before their end.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def simulate_recording(
         If it has no segment to drive.
     """
     recording.stream('command')
-    parts = segments(recording)
+    parts, _ = driven_segments(recording)
     if not parts:
         raise CommandError(
             f'recording {recording.name} has no stretch without a gap in which all its streams '
@@ -113,7 +114,9 @@ def _segment_streams(
     for name in COLUMNS:
         source = 'wheels' if name.startswith('wheel') else name
         own = segment.streams.get(source) if not rate else None
-        stamps[name] = even if own is None else own.times
+        # Where a sensor falls silent before the commands end, the drive goes on.
+        stamps[name] = even if own is None else np.concatenate(
+            [own.times, even[even > own.times[-1]]])
     return {'command': segment.streams['command'],
             **_streams(seen, stamps, torque_per_current)}
 

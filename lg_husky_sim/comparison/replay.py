@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 from lg_husky_sim.comparison.slopes import local_fit
-from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.husky.plant import ENCODER_WINDOW, Plant
 from lg_husky_sim.recording import Segment
-from lg_husky_sim.signals import BodyTwist, Pose, TimeSeries
-from lg_husky_sim.simulation import rollout, Simulator
+from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
+from lg_husky_sim.simulation import Simulator
+from lg_husky_sim.simulation.events import COLUMNS, Events
 from lg_husky_sim.simulation.starting import commanded_until
 import numpy as np
 
@@ -113,22 +115,44 @@ def replay(
     segment : Segment
         With a stream ``command``.
     period : float
-        Step [s].
+        Longest time between two samples [s].
     start : InitialState, optional
         Where to start; estimated from the segment if not given.
 
     Returns
     -------
     TimeSeries
-        The simulator's columns as its sensors read them, from the segment's start to its end.
+        The simulator's columns as its sensors read them, from the segment's start to its end: at
+        every step, and exact at every stamp of the segment's streams.
     """
     plant = plant.in_recording(segment.recording)
     at = start or initial_state(segment, plant)
-    end = segment.end + period  # the last sample lies inside the grid
-    truth = rollout(plant, segment.streams['command'], end, period, segment.start, at.pose,
-                    at.twist, at.wheel_rates, at.wheel_angles, commanded_until(
-                        segment.start, segment.streams['command'], at.twist, at.wheel_rates))
-    return plant.observe(truth)
+    commands = segment.streams['command']
+    before = commanded_until(segment.start, commands, at.twist, at.wheel_rates)
+    simulator = Simulator(plant, period)
+    state = simulator.initial(at.pose, at.twist, segment.start, at.wheel_rates, at.wheel_angles,
+                              before)
+    times = _times(plant, segment, period)
+    events = Events(commands, times[1:], start=segment.start, fresh=True)
+    out = simulator.propagator.run(events, state.flat)
+    return plant.observe(TimeSeries(times, np.vstack([state.row, out]), COLUMNS))
+
+
+def _times(plant: Plant, segment: Segment, period: float) -> FloatArray:
+    # A grid to one period beyond the end, the stamps of all streams, and what their sensors look
+    # back to: delays, and the time over which encoders count.
+    count = math.ceil((segment.end - segment.start) / period - 1e-9) + 1
+    times = [segment.start + period * np.arange(count + 1)]
+    for name, delays in (('wheels', 'delay_wheels'), ('wheel_angles', 'delay_wheels'),
+                         ('imu', 'delay_imu'), ('pose', 'delay_pose')):
+        if name not in segment.streams:
+            continue
+        for delay in {getattr(one.sensors, delays) for one in plant.sets} | {0.0}:
+            stamps = segment.streams[name].times - delay
+            times.extend((stamps, stamps - ENCODER_WINDOW) if 'wheel' in name else (stamps,))
+    every = np.unique(np.concatenate(times))
+    end = segment.start + period * count
+    return every[(every >= segment.start) & (every <= end)]
 
 
 def _rest(segment: Segment) -> float:

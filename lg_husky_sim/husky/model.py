@@ -22,6 +22,9 @@ from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, NumericModel
 from lg_husky_sim.linear_graph.expressions import compile_tuple, GLOBALS
 import numpy as np
 
+#: Efforts of gravity.
+GRAVITY = ('F_slope',)
+
 
 class Drivetrain(enum.Enum):
     """The paper's two drivetrain graphs."""
@@ -140,6 +143,7 @@ class _Regime:
         counts = [len(branch_of(edited.graph, name).characteristic.of)  # type: ignore[union-attr]
                   for name in self.numeric.efforts]
         self._offsets = np.cumsum([0, *counts], dtype=np.int64)[:-1]
+        self._felt = np.array([name not in GRAVITY for name in self.numeric.efforts], dtype=float)
         self._volts = np.zeros((2, len(rows)))
         for j, name in enumerate(self.numeric.efforts):
             if name.startswith('E_'):
@@ -156,7 +160,8 @@ class _Regime:
         forward = space.C[2]
         rows = np.vstack([space.C, forward @ space.A, np.zeros((2, space.A.shape[0]))])
         rows_u = np.vstack([space.D, forward @ space.B, np.eye(2)])
-        rows_f = np.vstack([space.L_c, forward @ space.G, self._volts])
+        # An accelerometer gives specific force: it does not feel gravity's pull along a slope.
+        rows_f = np.vstack([space.L_c, self._felt * (forward @ space.G), self._volts])
         volts = values['supply_voltage'] * values['command_gain']
         command = CommandStage(volts, volts * values['turn_ratio'], values['supply_voltage'])
         command = replace(command, **{

@@ -110,7 +110,8 @@ class PlantSet:
     h, k : numpy.ndarray, shapes (n_arguments, n), (n_arguments, 2)
         z = h x + k u.
     rows, rows_u, rows_f : numpy.ndarray, shapes (9, n), (9, 2), (9, n_efforts)
-        Outputs, in the order of :data:`OUTPUTS`.
+        Outputs, in the order of :data:`OUTPUTS`; accel_x is the specific force that an
+        accelerometer gives (REP-145): on a slope it does not feel gravity's pull.
     laws, offsets : numpy.ndarray of int64, shape (n_efforts,)
     coefficients : numpy.ndarray, shape (n_efforts, laws.WIDTH)
     command : CommandStage
@@ -223,11 +224,13 @@ class Plant:
             as they are.
         """
         late = self.late(truth.times, truth.column('x'))
-        values = np.array(truth.values)
-        for index, one in enumerate(self.sets):
-            where = late if index else np.ones(len(truth), dtype=bool)
-            seen = _observed(truth, one.sensors)
-            values[where] = seen[where]
+        seen = [_observed(truth, one.sensors) for one in self.sets]
+        values = np.where(late[:, None], seen[-1], seen[0])
+        for side in ('angle_left', 'angle_right') if len(seen) > 1 else ():
+            # Encoders count what is turned: another factor does not move what was counted.
+            place = truth.names.index(side)
+            early, later = (np.diff(one[:, place], prepend=one[0, place]) for one in seen)
+            values[:, place] = seen[0][0, place] + np.cumsum(np.where(late, later, early))
         return TimeSeries(truth.times, values, truth.names)
 
 

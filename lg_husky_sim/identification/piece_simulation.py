@@ -9,8 +9,9 @@ from functools import lru_cache
 from lg_husky_sim.husky.plant import SensorModel
 from lg_husky_sim.identification.pieces import PERIOD, Piece
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
-from lg_husky_sim.simulation.kernel import COLUMNS, run
-from lg_husky_sim.simulation.simulator import hold, Simulator
+from lg_husky_sim.simulation.event_kernel import COLUMNS, run
+from lg_husky_sim.simulation.events import Events
+from lg_husky_sim.simulation.simulator import Simulator
 from lg_husky_sim.simulation.starting import commanded_until
 import numpy as np
 
@@ -43,13 +44,13 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
         onset: it would be out of phase after a few turns otherwise. The angle columns go on
         without a jump.
     """
-    held, before = _held(piece, latency)
+    events, before = _events(piece, latency)
     twist, rates = piece.twist, piece.wheel_rates
     if correction is not None:
         forward, yaw, left, right = (float(c) for c in np.add(piece.began, correction))
         twist, rates = BodyTwist(forward, yaw), (left, right)
-    known = piece.pose is not None or piece.turned is not None
-    stride = max(1, round(RESET / PERIOD)) if known else piece.count or 1
+    # Whether or not something is known there: steps of the simulation end at the resets.
+    stride = max(1, round(RESET / PERIOD))
     poses = _poses(piece, stride)
     angles = _angles(piece, stride, simulator.plant.sets[0].sensors)
     state = simulator.initial(poses[0], twist, piece.start, rates, piece.wheel_angles, before)
@@ -57,6 +58,7 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
     out = np.empty((piece.count + 1, len(COLUMNS)))
     out[0] = state.row
     ahead = np.zeros(2)
+    longest = max(one.command.latency for one in simulator.plant.sets)
     for first in range(0, piece.count, stride):
         last = min(first + stride, piece.count)
         if piece.pose is not None and first:
@@ -67,17 +69,20 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
             wheel = angles[first // stride] - flat[state.n + 9:state.n + 11]
             ahead += flat[state.n:state.n + 2] - wheel
             flat[state.n:state.n + 2] = wheel
-        run(flat, held[first:last], out[first + 1:last + 1],
-            *simulator.operators.arguments)  # type: ignore[arg-type]
+        given = max(int(np.searchsorted(events.stamps, flat[state.n + 6] - longest)) - 1, 0)
+        run(flat, events.stamps[given:], events.values[given:], events.times[first:last],
+            events.places[:last - first], out[first + 1:last + 1], events.times[last - 1],
+            simulator.fine_pose, simulator.propagator.packed)
         for column, lead in zip(ANGLES, ahead.tolist(), strict=True):
             out[first + 1:last + 1, column] += lead
     return out
 
 
 @lru_cache(maxsize=256)
-def _held(piece: Piece, latency: float) -> tuple[FloatArray, BodyTwist]:
-    # Commands in each step, and those until the start. Measured and not corrected motion tells
-    # whether the piece begins at rest: a start that is estimated would switch it over.
+def _events(piece: Piece, latency: float) -> tuple[Events, BodyTwist]:
+    # Commands and the grid, and what was commanded until the start. Measured and not corrected
+    # motion tells whether the piece begins at rest: a start that is estimated would switch it
+    # over.
     commands = piece.commands
     before = commanded_until(piece.start, commands, piece.twist, piece.wheels_began)
     if latency:
@@ -87,7 +92,8 @@ def _held(piece: Piece, latency: float) -> tuple[FloatArray, BodyTwist]:
             times = np.insert(times, 0, piece.start)
             values = np.insert(values, 0, (before.forward, before.yaw), axis=0)
         commands = TimeSeries(times, values, commands.names)
-    return hold(commands, piece.start, PERIOD, piece.count), before
+    grid = piece.start + PERIOD * np.arange(1, piece.count + 1)
+    return Events(commands, grid, start=piece.start, fresh=True), before
 
 
 def _angles(piece: Piece, stride: int, sensors: SensorModel) -> FloatArray | None:

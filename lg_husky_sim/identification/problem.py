@@ -31,7 +31,7 @@ from lg_husky_sim.identification.pieces import (
 from lg_husky_sim.identification.sampling import sample
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import FloatArray
-from lg_husky_sim.simulation.kernel import COLUMNS
+from lg_husky_sim.simulation.event_kernel import COLUMNS
 from lg_husky_sim.simulation.simulator import Simulator
 import numpy as np
 from numpy.typing import NDArray

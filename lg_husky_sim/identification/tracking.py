@@ -16,7 +16,7 @@ from lg_husky_sim.identification.lanes import operators, tracking_cost
 from lg_husky_sim.identification.pieces import piece_of
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose
-from lg_husky_sim.simulation.kernel import COLUMNS
+from lg_husky_sim.simulation.event_kernel import COLUMNS
 from lg_husky_sim.simulation.simulator import hold, Simulator
 from lg_husky_sim.simulation.starting import at_rest, commanded_until
 import numpy as np

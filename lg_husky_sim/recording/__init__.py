@@ -8,7 +8,13 @@ Reads rosbag2 (MCAP, sqlite3) and ROS 1 bags without ROS, by way of the library 
 
 from lg_husky_sim.recording.names import named_apart, named_as_in
 from lg_husky_sim.recording.reader import read_recording
-from lg_husky_sim.recording.recording import Recording, Segment, segments, windows
+from lg_husky_sim.recording.recording import (
+    driven_segments,
+    Recording,
+    Segment,
+    segments,
+    windows,
+)
 from lg_husky_sim.recording.topics import TopicMap
 from lg_husky_sim.recording.writer import write_recording
 
@@ -16,6 +22,7 @@ __all__ = [
     'Recording',
     'Segment',
     'TopicMap',
+    'driven_segments',
     'named_apart',
     'named_as_in',
     'read_recording',

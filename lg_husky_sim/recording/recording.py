@@ -198,6 +198,43 @@ def segments(recording: Recording, gap: float = DEFAULT_GAP) -> tuple[Segment, .
     return tuple(found)
 
 
+def driven_segments(recording: Recording, gap: float = DEFAULT_GAP
+                    ) -> tuple[tuple[Segment, ...], int]:
+    """
+    Cut a recording for driving its commands to their end, whatever its sensors do.
+
+    Parameters
+    ----------
+    recording : Recording
+        With a stream ``command``.
+    gap : float
+        Longest silence of the commands within a segment [s], positive.
+
+    Returns
+    -------
+    tuple of Segment
+        Those of :func:`segments`, each going on to the next one's start or to the end of its
+        commands: only a gap of the commands ends it.
+    int
+        Commands that are left out: no state of the robot is known before they were given.
+    """
+    found, commands = segments(recording, gap), recording.streams['command']
+    extended: list[Segment] = []
+    covered = 0
+    for first, last in _stretches(commands.times, gap):
+        inside = [part for part in found if first <= part.start <= last]
+        for k, part in enumerate(inside):
+            end = inside[k + 1].start if k + 1 < len(inside) else max(last, part.end)
+            extended.append(Segment(part.recording, len(extended), part.start, end,
+                                    cut(recording.streams, part.start, end)))
+        if inside:
+            # The last one before the start is in force there.
+            begin = np.searchsorted(commands.times, inside[0].start, side='right') - 1
+            covered += int(np.searchsorted(commands.times, last, side='right')) - max(
+                int(begin), 0)
+    return tuple(extended), len(commands) - covered
+
+
 def windows(segment: Segment, length: float) -> tuple[Segment, ...]:
     """
     Cut a segment into windows of one length.

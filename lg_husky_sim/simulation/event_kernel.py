@@ -33,6 +33,7 @@ from lg_husky_sim.simulation.reading_kernel import (
     ACCELERATION,
     Block,
     go,
+    go_by_arc,
     LANES,
     read,
     ROWS,
@@ -218,8 +219,11 @@ def _follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatA
             read(plant, c, efforts, xi, r, step.q, u, du, step.f, step.parabola, block)
             g = 0
             while g < count:
-                go(goals[g] - tau, block.driven[2, g] - went, block.driven[3, g] - turned, last,
-                   block, g, moved)
+                if fine:
+                    go(goals[g] - tau, block.driven[2, g] - went, block.driven[3, g] - turned,
+                       last, block, g, moved)
+                else:
+                    go_by_arc(block.driven[2, g] - went, block.driven[3, g] - turned, moved)
                 x_new = s[n + 4] + tangent[0] * moved[0] - tangent[1] * moved[1]
                 if kind >= 2.0:
                     there = x_new >= onset if kind == 2.0 else x_new <= onset
@@ -306,7 +310,7 @@ def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray
         Receives :data:`COLUMNS`; at a jump, what was before it.
     end : float
     fine : bool
-        Whether x and y are wanted to better than 1e-7 m; else they are chords between the times.
+        Whether x and y are wanted to better than 1e-7 m; else they are arcs between the points.
     plant : Packed
 
     Returns

@@ -89,7 +89,8 @@ class Propagator:
 
     def __init__(self, plant: Plant) -> None:
         self.plant = plant
-        self._packed = packed(plant)
+        #: What the kernel needs.
+        self.packed = packed(plant)
         self._starts = InitialStates(plant)
 
     def initial(self, pose: Pose | None = None, twist: BodyTwist | None = None,
@@ -113,7 +114,7 @@ class Propagator:
         initial : numpy.ndarray, shape (n + TAIL,)
             Flat state, of :meth:`initial`; its time is replaced by the events' start.
         fine_pose : bool
-            Whether x and y are wanted to better than 1e-7 m; else they are chords between the
+            Whether x and y are wanted to better than 1e-7 m; else they are arcs between the
             times, which is a little faster.
 
         Returns
@@ -125,7 +126,7 @@ class Propagator:
         flat[len(self.plant.states) + 6] = events.start
         out = np.empty((events.times.size, len(COLUMNS)))
         run_kernel(flat, events.stamps, events.values, events.times, events.places, out,
-                   events.end, fine_pose, self._packed)
+                   events.end, fine_pose, self.packed)
         return out
 
 

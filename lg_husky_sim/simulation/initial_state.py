@@ -22,6 +22,7 @@ class InitialStates:
     """
 
     def __init__(self, plant: Plant) -> None:
+        self._plant = plant
         self._set = plant.sets[0]
 
     @cached_property
@@ -73,7 +74,8 @@ class InitialStates:
         flat[n:n + 2] = wheel_angles
         flat[n + 3:n + 7] = pose.heading, pose.x, pose.y, time
         if command is not None:
-            limit = one.command
+            late = self._plant.late(np.array([time]), np.array([pose.x]))[0]
+            limit = self._plant.sets[-1 if late else 0].command
             flat[n + 11] = max(-limit.limit_forward, min(limit.limit_forward, command.forward))
             flat[n + 12] = max(-limit.limit_yaw, min(limit.limit_yaw, command.yaw))
             flat[n + 13:] = command.forward, command.yaw

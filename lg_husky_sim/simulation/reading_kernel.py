@@ -200,6 +200,17 @@ def go(width: float, went: float, turned: float, last: FloatArray, block: Block,
 
 
 @jit_part
+def go_by_arc(went: float, turned: float, moved: FloatArray) -> None:
+    """Put into ``moved``, as :func:`go`, what an arc of this way [m] and turn [rad] does."""
+    half = 0.5 * turned
+    sine, quarter = sine_of(half), sine_of(0.5 * half)
+    cosine = 1.0 - 2.0 * quarter * quarter
+    chord = went * (sine / half) if half != 0.0 else went
+    moved[0], moved[1] = chord * cosine, chord * sine
+    moved[2], moved[3] = 2.0 * sine * cosine, -2.0 * sine * sine
+
+
+@jit_part
 def write_row(out: FloatArray, place: int, block: Block, g: int, s: FloatArray, n: int,
               play: FloatArray) -> None:
     """Write an output row; encoders turn with the motors, ahead of the wheels by the play."""

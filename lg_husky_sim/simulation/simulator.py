@@ -4,19 +4,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 import math
 
 from lg_husky_sim.errors import ParameterError
-from lg_husky_sim.husky.laws import MEMORY
-from lg_husky_sim.husky.plant import Plant, PlantSet
+from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
-from lg_husky_sim.simulation.discretise import discretise, Operators
-from lg_husky_sim.simulation.kernel import COLUMNS, DELAY, run
+from lg_husky_sim.simulation.event_kernel import COLUMNS
+from lg_husky_sim.simulation.events import Events, Propagator
+from lg_husky_sim.simulation.initial_state import InitialStates
+from lg_husky_sim.simulation.marching import march
 import numpy as np
-
-_TAIL = 4 + 3 + MEMORY + 2 + 1 + 2 * DELAY
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +25,20 @@ class SimulatorState:
     Parameters
     ----------
     flat : numpy.ndarray, shape (n + tail,)
-        Laid out as :mod:`lg_husky_sim.simulation.kernel` says; read-only.
+        Laid out as :mod:`lg_husky_sim.simulation.event_kernel` says; read-only.
     row : numpy.ndarray, shape (15,)
         The kernel's output columns at this moment; read-only.
     states : tuple of str
         Names of the states of graph and controllers.
+    waiting : numpy.ndarray, shape (n_waiting, 3)
+        Commands that a dead time holds back: when each was given, before now [s], its forward
+        speed [m/s] and yaw rate [rad/s]; read-only.
     """
 
     flat: FloatArray
     row: FloatArray
     states: tuple[str, ...]
+    waiting: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def n(self) -> int:
@@ -81,7 +83,7 @@ class SimulatorState:
 
     @property
     def acceleration(self) -> float:
-        """Forward acceleration dv/dt at the end of the step [m/s²]."""
+        """Forward acceleration dv/dt at this moment [m/s²]."""
         return float(self.row[6])
 
     @property
@@ -100,7 +102,8 @@ class Simulator:
     period : float
         Step [s].
     fine_pose : bool
-        As in :func:`lg_husky_sim.simulation.discretise.discretise`.
+        Whether x and y are wanted to better than 1e-7 m; else they are arcs of the steps, which
+        is a little faster.
 
     Raises
     ------
@@ -113,7 +116,10 @@ class Simulator:
             raise ParameterError(f'period = {period} s is not a positive number')
         self.plant = plant
         self.period = period
-        self.operators: Operators = discretise(plant, period, fine_pose=fine_pose)
+        self.fine_pose = fine_pose
+        self.propagator = Propagator(plant)
+        self._starts = InitialStates(plant)
+        self._latency = max(one.command.latency for one in plant.sets)
 
     def initial(self, pose: Pose | None = None, twist: BodyTwist | None = None,
                 time: float = 0.0, wheel_rates: tuple[float, float] | None = None,
@@ -143,64 +149,19 @@ class Simulator:
             Other states (currents, controllers) are those of the nearest steady drive.
         """
         pose, twist = pose or Pose(), twist or BodyTwist()
-        one = self.plant.sets[0]
-        n = self.operators.n
-        flat = np.zeros(n + _TAIL)
         if wheel_rates is None and (twist.forward or twist.yaw):
-            wheel_rates = self._rates_without_slip(twist)
-        wanted = np.array([*(wheel_rates or (0.0, 0.0)), twist.forward, twist.yaw])
-        if np.any(wanted):
-            # The nearest steady drive, so that controllers and belts start where they would be,
-            # and the least change that makes it agree with what is wanted.
-            steady = self._steady
-            nearest = steady @ np.linalg.lstsq(one.rows[:4] @ steady, wanted, rcond=None)[0]
-            flat[:n] = nearest + np.linalg.lstsq(
-                one.rows[:4], wanted - one.rows[:4] @ nearest, rcond=None)[0]
-        flat[n:n + 2] = wheel_angles
-        flat[n + 3:n + 7] = pose.heading, pose.x, pose.y, time
-        if command is not None:
-            stage = n + 11
-            limit = self._in_force(time, pose.x).command
-            flat[stage] = max(-limit.limit_forward, min(limit.limit_forward, command.forward))
-            flat[stage + 1] = max(-limit.limit_yaw, min(limit.limit_yaw, command.yaw))
-            flat[stage + 3:stage + 3 + DELAY] = command.forward
-            flat[stage + 3 + DELAY:] = command.yaw
+            wheel_rates = self._starts.rates_without_slip(twist)
+        flat = self._starts.flat(pose, twist, time, wheel_rates, wheel_angles, command)
         row = np.zeros(len(COLUMNS))
-        row[:4] = wanted
+        row[:4] = *(wheel_rates or (0.0, 0.0)), twist.forward, twist.yaw
         row[7:13] = *wheel_angles, 0.0, pose.heading, pose.x, pose.y
-        return _state(flat, row, self.plant.states)
-
-    def _in_force(self, time: float, x: float) -> PlantSet:
-        # The set that the kernel's next step uses.
-        sets, middle = self.plant.sets, time + 0.5 * self.period
-        return sets[-1] if self.plant.late(np.array([middle]), np.array([x]))[0] else sets[0]
+        return _state(flat, row, self.plant.states, np.zeros((0, 3)))
 
     def rolling(self, left: float, right: float) -> BodyTwist:
         """Return the velocity at which wheels of these rates [rad/s] do not slip."""
         ahead = sum(self.initial(twist=BodyTwist(1.0, 0.0)).wheel_rates) / 2.0
         turning = self.initial(twist=BodyTwist(0.0, 1.0)).wheel_rates
         return BodyTwist(0.5 * (left + right) / ahead, (right - left) / (turning[1] - turning[0]))
-
-    @cached_property
-    def _steady(self) -> FloatArray:
-        # States per volt of steady driving, shape (n, 2).
-        one = self.plant.sets[0]
-        return np.asarray(np.linalg.lstsq(-one.a, one.b, rcond=None)[0], dtype=np.float64)
-
-    def _rates_without_slip(self, twist: BodyTwist) -> tuple[float, float]:
-        # The inverse of rolling: those at which the wheels' dampers carry no torque.
-        command = self.plant.sets[0].command
-        rates = np.array([twist.forward * command.volts_per_speed
-                          + sign * twist.yaw * command.volts_per_rate for sign in (-1.0, 1.0)])
-        one = self.plant.sets[0]
-        gains = one.rows[:4] @ self._steady
-        body = gains[2:] @ rates
-        share = [twist.forward / body[0] if body[0] else 1.0,
-                 twist.yaw / body[1] if body[1] else 1.0]
-        mean, half = 0.5 * (rates[0] + rates[1]), 0.5 * (rates[1] - rates[0])
-        left, right = gains[:2] @ np.array([share[0] * mean - share[1] * half,
-                                            share[0] * mean + share[1] * half])
-        return float(left), float(right)
 
     def step(self, state: SimulatorState, command: BodyTwist) -> SimulatorState:
         """
@@ -210,17 +171,13 @@ class Simulator:
         ----------
         state : SimulatorState
         command : BodyTwist
-            Held over the step.
+            Given now, and held over the step.
 
         Returns
         -------
         SimulatorState
         """
-        flat = np.array(state.flat)
-        out = np.empty((1, len(COLUMNS)))
-        run(flat, np.array([[command.forward, command.yaw]]), out,
-            *self.operators.arguments)  # type: ignore[arg-type]
-        return _state(flat, out[0], state.states)
+        return self.run(state, np.array([[command.forward, command.yaw]]))[0]
 
     def run(self, state: SimulatorState, commands: FloatArray
             ) -> tuple[SimulatorState, FloatArray]:
@@ -240,12 +197,17 @@ class Simulator:
         numpy.ndarray, shape (n_steps, 15)
             The kernel's columns after each step.
         """
-        flat = np.array(state.flat)
+        flat, count = np.array(state.flat), len(state.waiting)
         out = np.empty((commands.shape[0], len(COLUMNS)))
-        run(flat, np.ascontiguousarray(commands, dtype=np.float64), out,
-            *self.operators.arguments)  # type: ignore[arg-type]
+        ages = np.zeros(count + len(out))
+        values = np.zeros((ages.size, 2))
+        ages[:count], values[:count] = state.waiting[:, 0], state.waiting[:, 1:]
+        first, last = march(flat, ages, values, count,
+                            np.ascontiguousarray(commands, dtype=np.float64), out, self.period,
+                            self._latency, self.fine_pose, self.propagator.packed)
         row = out[-1] if len(out) else state.row
-        return _state(flat, np.array(row), state.states), out
+        waiting = np.column_stack([ages[first:last], values[first:last]])
+        return _state(flat, np.array(row), state.states, waiting), out
 
     def adopt(self, state: SimulatorState) -> SimulatorState:
         """
@@ -262,23 +224,24 @@ class Simulator:
             are kept, and the others (front axles, a controller's states) are those of the steady
             drive that comes nearest.
         """
-        n = self.operators.n
+        n = len(self.plant.states)
         if state.states == self.plant.states:
             return state
         one = self.plant.sets[0]
-        steady = self._steady
+        steady = self._starts.steady
         drive = np.linalg.lstsq(one.rows[:4] @ steady, state.row[:4], rcond=None)[0]
         nearest = steady @ drive
         flat = np.concatenate([nearest, state.flat[state.n:]])
         flat[:n] += np.linalg.lstsq(one.rows[:6], state.row[:6] - one.rows[:6] @ nearest,
                                     rcond=None)[0]
-        return _state(flat, np.array(state.row), self.plant.states)
+        return _state(flat, np.array(state.row), self.plant.states, np.array(state.waiting))
 
 
-def _state(flat: FloatArray, row: FloatArray, states: tuple[str, ...]) -> SimulatorState:
-    flat.setflags(write=False)
-    row.setflags(write=False)
-    return SimulatorState(flat, row, states)
+def _state(flat: FloatArray, row: FloatArray, states: tuple[str, ...], waiting: FloatArray
+           ) -> SimulatorState:
+    for array in (flat, row, waiting):
+        array.setflags(write=False)
+    return SimulatorState(flat, row, states, waiting)
 
 
 def hold(commands: TimeSeries, start: float, period: float, count: int) -> FloatArray:
@@ -326,7 +289,8 @@ def rollout(plant: Plant, commands: TimeSeries, end: float, period: float = 0.02
     ----------
     plant : Plant
     commands : TimeSeries
-        Names forward [m/s], yaw [rad/s]; held at their own stamps, averaged over each step.
+        Names forward [m/s], yaw [rad/s]; each holds from its own stamp on. One from before the
+        start counts as given there.
     end : float
         Last time [s].
     period : float
@@ -349,7 +313,8 @@ def rollout(plant: Plant, commands: TimeSeries, end: float, period: float = 0.02
     simulator = Simulator(plant, period)
     first = float(commands.times[0]) if start is None else start
     count = max(0, math.floor((end - first) / period + 1e-9))
-    state = simulator.initial(pose, twist, first, wheel_rates, wheel_angles, command)
-    _, out = simulator.run(state, hold(commands, first, period, count))
     times: FloatArray = first + period * np.arange(count + 1, dtype=np.float64)
+    state = simulator.initial(pose, twist, first, wheel_rates, wheel_angles, command)
+    events = Events(commands, times[1:], start=first, fresh=True)
+    out = simulator.propagator.run(events, state.flat)
     return TimeSeries(times, np.vstack([state.row, out]), COLUMNS)

@@ -10,10 +10,11 @@ from pathlib import Path
 
 from lg_husky_sim.comparison import channel_errors, initial_state, replay, tracking
 from lg_husky_sim.comparison.models import load_plants, NamedPlant, plants_in, unique_labels
+from lg_husky_sim.comparison.output import simulate_recording
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.identification.options import with_effects
-from lg_husky_sim.recording import Recording, Segment, segments
+from lg_husky_sim.recording import driven_segments, Recording, Segment, segments
 from lg_husky_sim.recording.recording import cut
 from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.simulation import rollout
@@ -69,7 +70,8 @@ def test_a_base_that_starts_in_motion_follows_what_was_commanded(
     whole = replay(plant, segments(recording)[0])
     late = replay(plant, _late(recording, 8.0, 'command', 'wheels'))
     for name in ('wheel_left', 'wheel_right'):
-        np.testing.assert_allclose(late.column(name), whole.column(name)[-len(late):], atol=0.02)
+        there = np.interp(late.times, whole.times, whole.column(name))
+        np.testing.assert_allclose(late.column(name), there, atol=0.02)
 
 
 @pytest.mark.parametrize('latency', [0.12, 0.3])
@@ -171,3 +173,18 @@ def test_an_onset_belongs_to_its_recording(paper: NamedPlant) -> None:
     assert sets[0].linear  # not begun
     assert not sets[2].linear  # stays
     assert plants_in([paper], 'first', names)[0].plant.linear
+
+
+def test_commands_are_driven_to_their_end_where_sensors_fall_silent(paper: NamedPlant) -> None:
+    """Two seconds of poses, eight of commands: all are driven; what came before is said."""
+    stamps = np.linspace(0.0, 8.0, 161)
+    commands = TimeSeries(stamps, np.tile([0.5, 0.1], (161, 1)), ('forward', 'yaw'))
+    pose = TimeSeries(np.linspace(1.0, 2.98, 100), np.zeros((100, 3)), ('x', 'y', 'heading'))
+    recording = Recording('dead', '', {'command': commands, 'pose': pose}, 0)
+    parts, left_out = driven_segments(recording)
+    assert [(part.start, part.end) for part in parts] == [(1.0, 8.0)]
+    assert left_out == 20
+    streams = simulate_recording(paper.plant, recording, 1.0)
+    assert streams['command'].times[-1] == pytest.approx(8.0)
+    assert streams['pose'].times[-1] == pytest.approx(8.0, abs=0.03)
+    assert streams['pose'].column('x')[-1] > 2.0

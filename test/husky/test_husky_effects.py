@@ -110,7 +110,6 @@ NEUTRAL: list[tuple[Effect, dict[str, float]]] = [
     (Effect('voltage_saturation'), {'clip_voltage': 24.0}),
     (Effect('motor_heating'), {'heating_rate': 0.0}),
     (Effect('command_latency'), {'latency': 0.0}),
-    (Effect('command_slew'), {'slew_forward': 50.0, 'slew_yaw': 100.0}),
     (Effect('command_limit', shape='both'), {'limit_forward': 20.0, 'limit_yaw': 20.0}),
     *((Effect('coulomb_drivetrain', side), {'dry_torque': 0.0})
       for side in ('left', 'right', 'both')),
@@ -201,7 +200,7 @@ def test_a_load_on_the_ground_scales_what_the_ground_does(robot: Maker) -> None:
 
 def test_the_others_are_covered() -> None:
     """Every entry has a neutral size above, or a reason for having none."""
-    none = {'gyro_sign', 'speed_loop', 'traction_saturation', 'belt_compliance'}
+    none = {'gyro_sign', 'speed_loop', 'traction_saturation', 'belt_compliance', 'command_slew'}
     assert {effect.id for effect, _ in NEUTRAL} | none == set(IDS) | set(descriptions())
 
 

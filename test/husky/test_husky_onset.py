@@ -48,11 +48,11 @@ def test_at_a_place(robot: Maker) -> None:
     above = driven(robot(PULL, onset=Onset(OnsetKind.PLACE_ABOVE, 1.5), pull_moment=5.0))
     changed = apart(above, base) > 1e-6
     first = int(np.argmax(changed))
-    assert above.column('x')[first - 1] >= 1.5 > above.column('x')[first - 2]
+    assert above.column('x')[first] >= 1.5 > above.column('x')[first - 1]
     below = driven(robot(PULL, onset=Onset(OnsetKind.PLACE_BELOW, -1.5), pull_moment=5.0), -0.6)
     changed = apart(below, driven(robot(), -0.6)) > 1e-6
     first = int(np.argmax(changed))
-    assert below.column('x')[first - 1] <= -1.5 < below.column('x')[first - 2]
+    assert below.column('x')[first] <= -1.5 < below.column('x')[first - 1]
 
 
 def test_leaving_the_place_ends_it(robot: Maker) -> None:

@@ -18,7 +18,7 @@ from lg_husky_sim.recording import Segment
 from lg_husky_sim.recording.recording import cut
 from lg_husky_sim.signals import BodyTwist, TimeSeries
 from lg_husky_sim.simulation import rollout, Simulator
-from lg_husky_sim.simulation.kernel import COLUMNS
+from lg_husky_sim.simulation.event_kernel import COLUMNS
 import numpy as np
 import pytest
 

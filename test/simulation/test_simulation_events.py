@@ -86,6 +86,17 @@ def test_a_ramp_ends_where_it_should(robot: Maker) -> None:
     np.testing.assert_allclose(seen, [full * 0.06 / 0.25, full, full], rtol=1e-12)
 
 
+def test_a_fast_ramp_only_rounds_the_corners(robot: Maker) -> None:
+    """At the bounds of the catalogue a ramp is over within 20 ms, and nothing else is changed."""
+    fast = robot('command_slew', slew_forward=50.0, slew_yaw=100.0)
+    commands = series([0.0, 1.0], [[0.6, 0.3], [0.2, -0.5]])
+    times = np.array([0.011, 0.5, 1.0, 1.02, 1.5])
+    ramped, plain = (trajectory(one, commands, times).column('voltage_left')
+                     for one in (fast, robot()))
+    np.testing.assert_allclose(ramped[1:], plain[1:], rtol=1e-12)
+    assert 0.5 * plain[0] < ramped[0] < plain[0]
+
+
 def test_a_ramp_through_the_clamp_is_cut_off_exactly(robot: Maker) -> None:
     plant = robot(Effect('command_slew', shape='forward'), slew_forward=1.0)
     commands = series([0.0, 3.0], [[3.0, 0.0], [-3.0, 0.0]])

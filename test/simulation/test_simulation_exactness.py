@@ -12,11 +12,9 @@ from lg_husky_sim.husky.laws import evaluate, Law, MEMORY
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation import rollout, Simulator
-from lg_husky_sim.simulation.discretise import expm
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-import scipy.linalg
 
 Maker = Callable[..., Plant]
 
@@ -120,34 +118,20 @@ def test_linear_plants_agree_with_radau(robot: Maker, effects: tuple[str, ...]) 
     np.testing.assert_allclose(columns(plant, 0.02), expected, rtol=0, atol=2e-9)
 
 
-# Largest errors at steps of 20 ms (two sub-steps): speed and yaw rate, wheel rates [SI], pose
-# [m, rad]. Twice what was measured; the ratio is the least gain from steps of 2.5 ms.
-NON_LINEAR = [
-    ('rolling_resistance', 3e-5, 2e-5, 8.0),
-    ('quadratic_drag', 1e-6, 2e-6, 8.0),
-    ('yaw_scrub_coulomb', 2e-5, 1e-4, 1.0),
-    ('yaw_scrub_speed', 3e-6, 2e-6, 8.0),
-    ('slope', 1e-6, 1e-6, 8.0),
-    ('torque_ripple', 1e-5, 2e-6, 8.0),
-    ('coulomb_drivetrain', 2e-4, 2e-4, 2.0),
-    ('battery_sag', 6e-4, 1e-3, 2.0),
-    ('traction_saturation', 6e-3, 2e-3, 10.0),
-]
-
-
-@pytest.mark.parametrize(('effect', 'motion', 'pose', 'gain'), NON_LINEAR)
-def test_efforts_agree_with_radau(robot: Maker, effect: str, motion: float, pose: float,
-                                  gain: float) -> None:
+@pytest.mark.parametrize('effect', [
+    'rolling_resistance', 'quadratic_drag', 'yaw_scrub_coulomb', 'yaw_scrub_speed', 'slope',
+    'torque_ripple', 'coulomb_drivetrain', 'battery_sag', 'traction_saturation'])
+def test_efforts_agree_with_radau(robot: Maker, effect: str) -> None:
+    """At any period: speeds and rates to 2e-6 [m/s, rad/s], the pose to 3e-6 [m, rad]."""
     plant = robot(effect)
-    expected = Equations(plant).solve(1e-7, 1e-9)
-    linear = columns(robot(), 0.02)
-    errors = [np.abs(columns(plant, period) - expected).max(axis=0)
-              for period in (0.02, 0.0025)]
-    assert errors[0][:4].max() < motion
-    assert errors[0][9:].max() < pose
-    assert errors[1][9:].max() * gain < max(errors[0][9:].max(), 1e-7 * gain)
+    expected = Equations(plant).solve(1e-8, 1e-10)
+    for period in (0.02, 0.0025):
+        error = np.abs(columns(plant, period) - expected).max(axis=0)
+        assert error[:4].max() < 2e-6
+        assert error[9:].max() < 3e-6
     # The effect itself is far larger than the error it is computed with.
-    assert np.abs(linear - expected)[:, :4].max() > 10.0 * errors[0][:4].max()
+    linear = columns(robot(), 0.02)
+    assert np.abs(linear - expected)[:, :4].max() > 1e-3
 
 
 @pytest.mark.parametrize(('effect', 'values'), [
@@ -164,44 +148,16 @@ def test_efforts_of_the_voltage_alone_are_as_exact_as_the_linear_plant(
                                rtol=0, atol=2e-8)
 
 
-@pytest.mark.parametrize(('effect', 'value', 'coarsest', 'finest'), [
-    ('current_limit', 2.0, 0.15, 0.01),
-    ('motor_heating', 0.005, 0.02, 0.005),
-])
-def test_efforts_in_the_fast_modes_converge_with_the_step(
-        robot: Maker, effect: str, value: float, coarsest: float, finest: float) -> None:
+@pytest.mark.parametrize(('effect', 'value'), [('current_limit', 2.0), ('motor_heating', 0.005)])
+def test_efforts_in_the_fast_modes_are_followed_at_any_period(
+        robot: Maker, effect: str, value: float) -> None:
     """
-    Both live on the milliseconds after a jump of the voltage, which a sub-step passes over.
+    Both live on the milliseconds after a jump of the voltage, far shorter than a period.
 
-    A current limit undoes the back-EMF (some 0.1 m/s for a moment at 20 ms); heat sees one current
-    a sub-step and misses the inrush.
+    A current limit undoes the back-EMF (some 0.1 m/s for a moment); heat counts the inrush.
     """
     name = {'current_limit': 'current_limit', 'motor_heating': 'heating_rate'}[effect]
     plant = robot(effect, **{name: value})
-    expected = Equations(plant).solve(1e-6, 1e-8)
-    motion = [np.abs(columns(plant, period) - expected)[:, 2:4].max()
-              for period in (0.01, 0.005, 0.0025, 0.00125, 0.000625)]
-    assert motion[0] < coarsest
-    assert motion[2] < 0.75 * motion[0]
-    assert motion[4] < 0.5 * motion[2]
-    assert motion[4] < finest
-
-
-@pytest.mark.parametrize('scale', [1e-6, 1e-3, 0.3, 1.0, 20.0, 300.0])
-@pytest.mark.parametrize('size', [1, 6, 10, 20])
-def test_expm_agrees_with_scipy(scale: float, size: int) -> None:
-    generator = np.random.default_rng(size)
-    matrix = generator.normal(size=(size, size)) * scale / size - 2.0 * scale * np.eye(size)
-    matrix[0, 0] += 2.0 * scale
-    expected = scipy.linalg.expm(matrix)
-    np.testing.assert_allclose(expm(matrix), expected, rtol=0,
-                               atol=1e-14 * max(1.0, scale) * np.abs(expected).max())
-
-
-def test_expm_of_the_robot_over_a_step(robot: Maker) -> None:
-    for period in (0.001, 0.02, 0.2):
-        matrix = robot().sets[0].a * period
-        np.testing.assert_allclose(expm(matrix), scipy.linalg.expm(matrix), rtol=0, atol=1e-11)
-    np.testing.assert_array_equal(expm(np.zeros((4, 4))), np.eye(4))
-    turned = expm(np.array([[0.0, -np.pi / 3], [np.pi / 3, 0.0]]))
-    np.testing.assert_allclose(turned, [[0.5, -0.75 ** 0.5], [0.75 ** 0.5, 0.5]], atol=1e-14)
+    expected = Equations(plant).solve(1e-8, 1e-10)
+    for period in (0.02, 0.01, 0.0025, 0.000625):
+        assert np.abs(columns(plant, period) - expected)[:, 2:4].max() < 5e-6

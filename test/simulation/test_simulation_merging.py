@@ -10,8 +10,8 @@ from dataclasses import replace
 from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.laws import Law
 from lg_husky_sim.husky.plant import Plant
-import lg_husky_sim.simulation.discretise as discretise
 from lg_husky_sim.simulation.merging import merged
+import lg_husky_sim.simulation.modes as modes
 from lg_husky_sim.simulation.simulator import Simulator
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_the_drive_is_the_same(robot: Maker, monkeypatch: pytest.MonkeyPatch,
     plant = robot(TYRES, *([] if name == TYRES.id else [name]))
     simulator = Simulator(plant, 0.02)
     _, one = simulator.run(simulator.initial(), DRIVE)
-    monkeypatch.setattr(discretise, 'merged', lambda same: same)
+    monkeypatch.setattr(modes, 'merged', lambda same: same)
     apart = Simulator(plant, 0.02)
     _, other = apart.run(apart.initial(), DRIVE)
     np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-9)

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.laws import CONTEXT, evaluate, Law, MEMORY
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.simulation.discretise import discretise
 from lg_husky_sim.simulation.merging import merged
+from lg_husky_sim.simulation.modes import packed
 import numpy as np
 import pytest
 
@@ -22,8 +22,8 @@ BEGINNING = sorted(name for name in catalogue() if name != 'speed_loop')
 @pytest.mark.parametrize('name', BEGINNING)
 def test_padding_reads_nothing_and_adds_nothing(robot: Maker, name: str) -> None:
     plant = robot(Effect(name, late=True), onset=Onset(OnsetKind.TIME, 1.0))
-    _, _, _, *stacks = discretise(plant, 0.02).arguments
-    laws, coefficients, offsets = (np.asarray(stack) for stack in stacks[7:10])
+    numbers = packed(plant)
+    laws, coefficients, offsets = numbers.laws, numbers.coefficients, numbers.offsets
     for c, one in enumerate(plant.sets):
         efforts, own = laws.shape[1], merged(one).laws.size
         z, memory, out = np.full(8, np.nan), np.full(MEMORY, np.nan), np.full(efforts, 7.0)

@@ -18,7 +18,7 @@ from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.jit import compiled, SWITCH
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation import rollout, Simulator
-from lg_husky_sim.simulation.kernel import COLUMNS
+from lg_husky_sim.simulation.events import COLUMNS, trajectory
 from lg_husky_sim.simulation.simulator import hold
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,19 +58,26 @@ def test_live_steps_are_the_replay_bit_for_bit(robot: Maker, effects: tuple[str,
     np.testing.assert_array_equal(np.vstack([first, second]), out)
 
 
-def test_rollout_is_the_run_of_the_held_commands(robot: Maker) -> None:
+def test_rollout_is_the_trajectory_at_its_grid(robot: Maker) -> None:
+    """Commands at any stamps count at those stamps: nothing is averaged over a step."""
     plant = robot(*MANY)
     generator = np.random.default_rng(5)
     times = np.cumsum(generator.uniform(0.01, 0.2, 40))
     commands = series(times, generator.uniform(-1.0, 1.0, (40, 2)))
-    run = rollout(plant, commands, 4.0, 0.02, start=0.5, pose=Pose(1.0, 2.0, 3.0))
-    simulator = Simulator(plant, 0.02)
-    state = simulator.initial(Pose(1.0, 2.0, 3.0), time=0.5)
-    held = hold(commands, 0.5, 0.02, 175)
-    _, out = simulator.run(state, held)
+    start = float(times[0])
+    run = rollout(plant, commands, 4.0, 0.02, pose=Pose(1.0, 2.0, 3.0))
+    free = trajectory(plant, commands, run.times[1:], pose=Pose(1.0, 2.0, 3.0))
     assert run.names == COLUMNS
-    np.testing.assert_array_equal(run.values, np.vstack([state.row, out]))
-    np.testing.assert_allclose(run.times, 0.5 + 0.02 * np.arange(176), atol=1e-12)
+    np.testing.assert_array_equal(run.values[1:], free.values)
+    np.testing.assert_allclose(run.times, start + 0.02 * np.arange(len(run)), atol=1e-12)
+
+
+def test_commands_on_the_grid_are_steps(robot: Maker) -> None:
+    plant, values = robot(), wandering(100)
+    run = rollout(plant, series(0.02 * np.arange(100), values), 2.0, 0.02)
+    simulator = Simulator(plant, 0.02)
+    _, out = simulator.run(simulator.initial(), values)
+    np.testing.assert_allclose(run.values[1:], out, rtol=0, atol=1e-9)
 
 
 def test_a_step_leaves_its_state_alone_and_names_agree(robot: Maker) -> None:
@@ -145,26 +152,24 @@ def shaped(plant: Plant, commands: FloatArray, period: float = 0.02) -> FloatArr
                             (right - left) / (2.0 * stage.volts_per_rate)])
 
 
-def test_latency_between_two_steps(robot: Maker) -> None:
+def test_a_dead_time_ends_between_two_steps(robot: Maker) -> None:
+    """What reaches the voltages at the end of a step was commanded a dead time before."""
     commands = 0.6 * wandering(60)
     for steps in (0.0, 1.0, 2.5, 7.25):
         got = shaped(robot('command_latency', latency=0.02 * steps), commands)
-        places = np.arange(60) - steps
-        for column in (0, 1):
-            padded = np.concatenate([np.zeros(10), commands[:, column]])
-            expected = np.interp(places, np.arange(-10, 60), padded)
-            np.testing.assert_allclose(got[:, column], expected, atol=1e-12)
+        asked = np.ceil(np.arange(1, 61) - steps - 1e-9).astype(int) - 1
+        expected = np.where(asked[:, None] >= 0, commands[np.maximum(asked, 0)], 0.0)
+        np.testing.assert_allclose(got, expected, atol=1e-12)
 
 
-def test_a_latency_longer_than_the_delay_line_is_refused(robot: Maker) -> None:
-    """Never shortened in silence."""
+def test_no_dead_time_is_too_long_for_a_period(robot: Maker) -> None:
     plant = robot('command_latency', latency=1.0)
     commands = np.tile([0.5, 0.0], (1200, 1))
-    got = shaped(plant, commands[:300], 0.01)[:, 0]
-    assert got[98] == 0.0
-    assert got[100] == pytest.approx(0.5)
-    with pytest.raises(ParameterError, match=r'latency = 1 s .* period'):
-        Simulator(plant, 0.001)
+    for period in (0.01, 0.001):
+        got = shaped(plant, commands, period)[:, 0]
+        last = round(1.0 / period)
+        assert np.all(got[:last - 1] == 0.0)
+        np.testing.assert_allclose(got[last + 1:], 0.5, rtol=1e-12)
 
 
 def test_slew_and_limit(robot: Maker) -> None:
