@@ -11,6 +11,7 @@ from importlib import import_module
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from typing import Any, TypeVar
 
@@ -20,6 +21,8 @@ Task = TypeVar('Task')
 Outcome = TypeVar('Outcome')
 #: Seconds to wait for a scheduler to answer.
 PATIENCE = 10.0
+#: Environment variable: who takes the tasks where no scheduler is given.
+BACKEND = 'LG_HUSKY_BACKEND'
 
 
 def _begin(needed: str) -> None:
@@ -87,6 +90,7 @@ def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
         Processes on this machine.
     scheduler : str, optional
         Address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``; takes the tasks instead.
+        Without one, ``LG_HUSKY_BACKEND`` may hold it, as ``dask:ADDRESS``.
     progress : callable, optional
         Called after each task.
 
@@ -98,11 +102,12 @@ def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
     Raises
     ------
     FitError
-        If the scheduler does not answer.
+        If the scheduler does not answer, or LG_HUSKY_BACKEND cannot be understood.
     MissingExtraError
         If a scheduler is given and Dask is not installed.
     """
     tell = progress or (lambda: None)
+    scheduler = scheduler or _scheduler_of_environment()
     if scheduler is not None:
         return _dask(function, tasks, scheduler, tell)
     if jobs <= 1 or len(tasks) <= 1:
@@ -117,6 +122,29 @@ def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
             future.result()
             tell()
         return [future.result() for future in futures]
+
+
+def _scheduler_of_environment() -> str | None:
+    text = os.environ.get(BACKEND, '') or 'processes'
+    name, _, address = text.partition(':')
+    if text == 'processes':
+        return None
+    if name != 'dask' or not address:
+        raise FitError(f'{BACKEND} = {text!r} is not allowed: processes, or dask:ADDRESS such as '
+                       'dask:tcp://10.0.0.1:8786')
+    # A task that runs on the cluster does not hand its own tasks to it again.
+    return None if _on_a_worker() else address
+
+
+def _on_a_worker() -> bool:
+    dask: Any = sys.modules.get('distributed')
+    if dask is None:
+        return False
+    try:
+        dask.get_worker()
+    except ValueError:
+        return False
+    return True
 
 
 def _dask(function: Callable[[Task], Outcome], tasks: Sequence[Task], scheduler: str,

@@ -10,6 +10,7 @@ import math
 from pathlib import Path
 
 from lg_husky_sim.cli.main import run
+from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.identification.executor import run_tasks
 from lg_husky_sim.recording import Segment, write_recording
@@ -91,6 +92,19 @@ def test_dask_gives_the_same_results(bag: Path, tmp_path: Path) -> None:
     local = dict(load_model(here).parameters)
     assert dict(load_model(there).parameters) == local
     assert dict(load_model(tmp_path / 'each' / f'{bag.name}.yaml').parameters) == local
+
+
+@pytest.mark.parametrize('backend', ['dask', 'dask:', 'spark:x', 'threads'])
+def test_a_backend_that_is_none_is_one_line(
+        backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('LG_HUSKY_BACKEND', backend)
+    with pytest.raises(FitError, match=f"LG_HUSKY_BACKEND = '{backend}' is not allowed"):
+        run_tasks(math.factorial, [1, 2])
+
+
+def test_processes_are_the_backend_of_who_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('LG_HUSKY_BACKEND', 'processes')
+    assert run_tasks(math.factorial, [3, 4], jobs=2) == [6, 24]
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(

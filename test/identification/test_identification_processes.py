@@ -25,6 +25,33 @@ if __name__ == '__main__':
         print('interrupted', flush=True)
 """
 
+CLUSTER = """
+import math, os, signal, time
+import distributed
+from lg_husky_sim.identification.executor import run_tasks
+
+def slow(number):
+    time.sleep(0.3)
+    return number * number, os.getpid()
+
+def nested(number):
+    return run_tasks(math.factorial, [number, number + 1])
+
+def lose_one():
+    if not lost:
+        lost.append(next(iter(cluster.workers.values())).pid)
+        os.kill(lost[0], signal.SIGKILL)
+
+if __name__ == '__main__':
+    lost = []
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None
+                                  ) as cluster:
+        os.environ['LG_HUSKY_BACKEND'] = f'dask:{cluster.scheduler_address}'
+        answers = run_tasks(slow, list(range(12)), progress=lose_one)
+        print([square for square, _ in answers] == [k * k for k in range(12)], len(lost),
+              os.getpid() in {pid for _, pid in answers}, run_tasks(nested, [3, 4]))
+"""
+
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_no_process_outlives_the_one_who_asked(number: signal.Signals, tmp_path: Path) -> None:
@@ -45,3 +72,14 @@ def test_no_process_outlives_the_one_who_asked(number: signal.Signals, tmp_path:
         assert not child.exists()
     assert said == 'interrupted\n' * (number is signal.SIGINT)
     assert 'Traceback' not in errors
+
+
+def test_a_cluster_named_by_the_environment_takes_the_tasks_and_may_lose_a_worker(
+        tmp_path: Path) -> None:
+    """All answers in order, none made here; tasks of tasks stay on their worker."""
+    pytest.importorskip('distributed')
+    program = tmp_path / 'program.py'
+    program.write_text(CLUSTER, encoding='utf-8')
+    ran = subprocess.run([sys.executable, str(program)], capture_output=True, text=True,
+                         timeout=300.0, check=False)
+    assert ran.stdout == 'True 1 False [[6, 24], [24, 120]]\n', ran.stderr
