@@ -9,6 +9,7 @@ import math
 import time
 from typing import Any
 
+from lg_husky_sim.jit import compiled
 from lg_husky_sim.ros import conversions
 from lg_husky_sim.ros.api import describe_backend, message_type, Node, steady_timer
 from lg_husky_sim.ros.clockwork import Clockwork
@@ -76,8 +77,9 @@ class SimNode(Node):
         self._clockwork = Clockwork(
             lambda: int(self.get_clock().now().nanoseconds), self._follows_clock,
             lambda text: log.warning(text, throttle_duration_sec=1.0))
-        # Who waits for the first odometry expects the robot to answer from then on, and without
-        # machine code on disk compiling takes seconds.
+        # Who waits for the first odometry expects the robot to answer from then on.
+        if compiled():
+            log.info('loading the kernel; the first start compiles it, for a minute or so')
         self._warm_up()
         self._publish()
         self._live = LiveSettings(self, self.settings, self._apply)

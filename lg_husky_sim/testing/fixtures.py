@@ -32,6 +32,8 @@ def live_husky() -> Iterator[Callable[..., Any]]:
     the test.
     """
     from lg_husky_sim.testing.live import LiveHusky, probed_domain
+    # Here and once, before anybody waits: the first start of a node compiles for a minute or so.
+    LockStepHusky().step()
     made: list[LiveHusky] = []
     with probed_domain() as probe:
         def make(arguments: tuple[str, ...] = (), environment: dict[str, str] | None = None,

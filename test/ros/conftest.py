@@ -27,7 +27,7 @@ if find_spec('rclpy') is not None or find_spec('cyclonedds') is not None:
 
 @pytest.fixture(scope='session', autouse=True)
 def machine_code() -> None:
-    """Compile once: 7 s of processor, which each node would need by itself, all at a time."""
+    """Compile once: 40 s of processor, which each node would need by itself, all at a time."""
     Engine(make_settings()).step()
 
 
