@@ -187,7 +187,8 @@ def _drivetrain(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         rate = f'omega({inertia.name})'
         rows: dict[str, tuple[Law, tuple[Coefficient, ...], tuple[str, ...]]] = {
             'coulomb_drivetrain': (Law.COULOMB, ('dry_torque', 'dry_speed', 0.0, 1.0), (rate,)),
-            'torque_ripple': (Law.WHEEL_PHASE, ('ripple_cos', 'ripple_sin', side), ()),
+            'torque_ripple': (Law.WHEEL_PHASE,
+                              ('ripple_cos', 'ripple_sin', side, 'ripple_speed'), (rate,)),
             'gear_backlash': (Law.BACKLASH, ('play', 'torque_constant*gear_ratio', side),
                               (f'V(V_S{number})', rate, f'i(L_{number})')),
         }

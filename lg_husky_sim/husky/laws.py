@@ -50,7 +50,8 @@ class Law(enum.IntEnum):
     HEADING = 4
     """f = p0 cos(heading) + p1 sin(heading)."""
     WHEEL_PHASE = 5
-    """f = p0 cos(angle) + p1 sin(angle); p2 is 0 for the left wheel, 1 for the right."""
+    """f = (p0 cos(angle) + p1 sin(angle)) (1 - exp(-(z0/p3)^2)); p2 is 0 for the left wheel,
+    1 for the right: what ripples as the motor turns does not drive a wheel that rests."""
     SLIP_SATURATION = 6
     """f = p0 tanh(p1 z0/p0) - p1 z0: turns damping p1 into a force that saturates at p0."""
     CURRENT_LIMIT = 7
@@ -86,7 +87,7 @@ EXPRESSIONS = {
     Law.WHILE_MOVING: 'p0*tanh(abs(z1)/p1)',
     Law.MODULATED_DAMPING: '-p0*abs(z2)*z1',
     Law.HEADING: 'p0*cos(heading)+p1*sin(heading)',
-    Law.WHEEL_PHASE: 'p0*cos(angle)+p1*sin(angle)+0*p2',
+    Law.WHEEL_PHASE: '(p0*cos(angle)+p1*sin(angle)+0*p2)*(1-exp(-(z1/p3)**2))',
     Law.SLIP_SATURATION: 'p0*tanh(p1*z1/p0)-p1*z1',
     Law.CURRENT_LIMIT: '(abs(z1-p2*z2+p1*p0)-abs(z1-p2*z2-p1*p0))/2+p2*z2-z1',
     Law.DEAD_ZONE: '-(abs(z1+p0)-abs(z1-p0))/2',
@@ -204,7 +205,9 @@ def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatA
             out[j] = p0 * math.cos(context[1]) + p1 * math.sin(context[1])
         elif law == 5:
             angle = context[4 + int(p2)]
-            out[j] = p0 * math.cos(angle) + p1 * math.sin(angle)
+            share = z[o] / coefficients[c, j, 3]
+            out[j] = (p0 * math.cos(angle) + p1 * math.sin(angle)) * (
+                1.0 - math.exp(-share * share))
         elif law == 6:
             out[j] = p0 * math.tanh(p1 * z[o] / p0) - p1 * z[o]
         elif law == 16:

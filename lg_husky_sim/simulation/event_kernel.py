@@ -322,10 +322,10 @@ def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray
     count = plant.hm.shape[2]
     step = Step(
         np.zeros(size), np.zeros(size), np.zeros((2, size)), np.zeros(2), np.zeros(2),
-        np.zeros((3, most)), np.zeros((2, most)), np.zeros((2, most)), np.zeros((3, count)),
+        np.zeros((3, most)), np.zeros((2, most)), np.zeros((2, most)), np.zeros((4, count)),
         np.zeros(count), np.zeros(CONTEXT), np.zeros(MEMORY), np.zeros((2, MEMORY)),
-        np.zeros(2), np.zeros((2, 4, size)), np.zeros(size), np.zeros(size), np.zeros(2),
-        np.zeros(4), np.zeros((2, most)), np.zeros((2, most)), np.zeros(most))
+        np.zeros(2), np.zeros((3, 4, size)), np.zeros(size), np.zeros(size), np.zeros(2),
+        np.zeros(4), np.zeros((3, most)), np.zeros((3, most)), np.zeros(most))
     block = Block(
         np.zeros(LANES), np.zeros((n + 2 + most, LANES)), np.zeros((n, LANES)),
         np.zeros((2, LANES)), np.zeros((ROWS, LANES)), np.zeros((4, LANES)))

@@ -168,34 +168,34 @@ def phis(t: float, rates: FloatArray, c: int, n_real: int, n_pairs: int, p: Floa
 
 
 @jit_part
-def doubled(t: float, rates: FloatArray, c: int, n_real: int, n_pairs: int, p: FloatArray
-            ) -> None:
+def doubled(t: float, rates: FloatArray, c: int, n_real: int, n_pairs: int, p: FloatArray,
+            k0: int) -> None:
     """
-    Put phi_k of rates times 2 ``t`` into ``p[1]``, from those at ``t`` [s] in ``p[0]``.
+    Put phi_k of rates times 2 ``t`` into ``p[k0 + 1]``, from those at ``t`` [s] in ``p[k0]``.
 
     2^k phi_k(2z) = exp(z) phi_k(z) + sum of phi_j(z)/(k - j)! for j = 1 to k.
     """
     for i in range(p.shape[2]):
-        f1, f2, f3, f4 = p[0, 0, i], p[0, 1, i], p[0, 2, i], p[0, 3, i]
+        f1, f2, f3, f4 = p[k0, 0, i], p[k0, 1, i], p[k0, 2, i], p[k0, 3, i]
         e = 1.0 + rates[c, i] * t * f1
-        p[1, 0, i] = 0.5 * (e * f1 + f1)
-        p[1, 1, i] = 0.25 * (e * f2 + f1 + f2)
-        p[1, 2, i] = 0.125 * (e * f3 + 0.5 * f1 + f2 + f3)
-        p[1, 3, i] = 0.0625 * (e * f4 + T3 * f1 + 0.5 * f2 + f3 + f4)
+        p[k0 + 1, 0, i] = 0.5 * (e * f1 + f1)
+        p[k0 + 1, 1, i] = 0.25 * (e * f2 + f1 + f2)
+        p[k0 + 1, 2, i] = 0.125 * (e * f3 + 0.5 * f1 + f2 + f3)
+        p[k0 + 1, 3, i] = 0.0625 * (e * f4 + T3 * f1 + 0.5 * f2 + f3 + f4)
     for k in range(n_real, n_real + n_pairs):
         m = k + n_pairs
         re, im = rates[c, k] * t, rates[c, m] * t
-        a = 1.0 + re * p[0, 0, k] - im * p[0, 0, m]
-        b = re * p[0, 0, m] + im * p[0, 0, k]
+        a = 1.0 + re * p[k0, 0, k] - im * p[k0, 0, m]
+        b = re * p[k0, 0, m] + im * p[k0, 0, k]
         for i in range(4):
-            f, g = p[0, i, k], p[0, i, m]
-            p[1, i, k], p[1, i, m] = a * f - b * g, a * g + b * f
+            f, g = p[k0, i, k], p[k0, i, m]
+            p[k0 + 1, i, k], p[k0 + 1, i, m] = a * f - b * g, a * g + b * f
         for i in (k, m):
-            f1, f2, f3, f4 = p[0, 0, i], p[0, 1, i], p[0, 2, i], p[0, 3, i]
-            p[1, 0, i] = 0.5 * (p[1, 0, i] + f1)
-            p[1, 1, i] = 0.25 * (p[1, 1, i] + f1 + f2)
-            p[1, 2, i] = 0.125 * (p[1, 2, i] + 0.5 * f1 + f2 + f3)
-            p[1, 3, i] = 0.0625 * (p[1, 3, i] + T3 * f1 + 0.5 * f2 + f3 + f4)
+            f1, f2, f3, f4 = p[k0, 0, i], p[k0, 1, i], p[k0, 2, i], p[k0, 3, i]
+            p[k0 + 1, 0, i] = 0.5 * (p[k0 + 1, 0, i] + f1)
+            p[k0 + 1, 1, i] = 0.25 * (p[k0 + 1, 1, i] + f1 + f2)
+            p[k0 + 1, 2, i] = 0.125 * (p[k0 + 1, 2, i] + 0.5 * f1 + f2 + f3)
+            p[k0 + 1, 3, i] = 0.0625 * (p[k0 + 1, 3, i] + T3 * f1 + 0.5 * f2 + f3 + f4)
 
 
 @jit_part

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from lg_husky_sim.husky.effects import OnsetKind
 from lg_husky_sim.husky.laws import Law, WIDTH
@@ -56,16 +56,16 @@ class Modes:
     into: FloatArray
 
 
-def modes_of(a: FloatArray, mixing: FloatArray | None = None) -> Modes:
+def modes_of(a: FloatArray, mixing: tuple[FloatArray, FloatArray] | None = None) -> Modes:
     """
     Return the modes of a matrix.
 
     Parameters
     ----------
     a : numpy.ndarray, shape (n, n)
-    mixing : numpy.ndarray, shape (n, n), optional
-        Coordinates mixing @ x in which a may fall apart into blocks, such as the mean of both
-        sides and their difference; modes then stay apart to the last bit.
+    mixing : tuple of numpy.ndarray, shapes (n, n), optional
+        Matrix of coordinates in which a may fall apart into blocks, such as the mean of both
+        sides and their difference, and its inverse; modes then stay apart to the last bit.
 
     Returns
     -------
@@ -73,16 +73,15 @@ def modes_of(a: FloatArray, mixing: FloatArray | None = None) -> Modes:
         Of a matrix nearby (:data:`PERTURBATION`) where equal eigenvalues share an eigenvector.
     """
     n = a.shape[0]
-    mixing = np.eye(n) if mixing is None else mixing
-    back = np.linalg.inv(mixing)
-    mixed = mixing @ a @ back
+    onto, back = (np.eye(n), np.eye(n)) if mixing is None else mixing
+    mixed = onto @ a @ back
     values = np.zeros(n, dtype=np.complex128)
     vectors = np.zeros((n, n), dtype=np.complex128)
     inverse = np.zeros((n, n), dtype=np.complex128)
     for block in _blocks(mixed):
         place = np.ix_(block, block)
         values[block], vectors[place], inverse[place] = _decomposed(mixed[place])
-    vectors, inverse = back @ vectors, inverse @ mixing
+    vectors, inverse = back @ vectors, inverse @ onto
     real = np.flatnonzero(values.imag == 0.0)
     pairs = np.flatnonzero(values.imag > 0.0)
     rates = np.concatenate([values[real].real, values[pairs].real, values[pairs].imag])
@@ -94,7 +93,8 @@ def modes_of(a: FloatArray, mixing: FloatArray | None = None) -> Modes:
 
 def _blocks(a: FloatArray) -> list[NDArray[np.intp]]:
     # States that act on each other, over any number of others.
-    linked = np.abs(a) > NOTHING * np.max(np.abs(a), initial=0.0)
+    size = np.abs(a)
+    linked = size > NOTHING * size.max(initial=0.0)
     linked = linked | linked.T | np.eye(a.shape[0], dtype=bool)
     for _ in range(max(1, a.shape[0].bit_length())):
         linked = linked @ linked
@@ -120,8 +120,8 @@ _SIDES = (('LW', 'RW'), ('(L_1)', '(L_2)'), ('J_RL', 'J_RR'), ('J_FL', 'J_FR'),
 
 
 @lru_cache(maxsize=64)
-def _sides_mixed(states: tuple[str, ...]) -> FloatArray:
-    # Sum and difference of both sides; the other states as they are.
+def _sides_mixed(states: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+    # Sum and difference of both sides, the other states as they are; and back.
     mixing = np.eye(len(states))
     for left, right in _SIDES:
         for i, state in enumerate(states):
@@ -129,8 +129,10 @@ def _sides_mixed(states: tuple[str, ...]) -> FloatArray:
             if twin != state and twin in states:
                 j = states.index(twin)
                 mixing[i, j], mixing[j, i], mixing[j, j] = 1.0, 1.0, -1.0
-    mixing.setflags(write=False)
-    return mixing
+    back = np.asarray(np.linalg.inv(mixing), dtype=np.float64)
+    for matrix in (mixing, back):
+        matrix.setflags(write=False)
+    return mixing, back
 
 
 def _inverse(vectors: NDArray[np.complex128]) -> NDArray[np.complex128] | None:
@@ -187,8 +189,9 @@ def packed(plant: Plant) -> Packed:
     stacks: list[list[NDArray[np.generic]]] = [[] for _ in range(15)]
     for one, mode in zip(sets, modes, strict=True):
         rows, rows_u, rows_f = _rows(one)
-        needs = (bool(np.any(np.isin(one.laws, _CONTEXTUAL))),
-                 bool(np.any(np.isin(one.laws, _REMEMBERING))), bool(np.any(one.k)))
+        laws = set(one.laws.tolist())
+        needs = (not laws.isdisjoint(_CONTEXTUAL), not laws.isdisjoint(_REMEMBERING),
+                 bool(one.k.any()))
         counts = np.array([mode.n_real, mode.n_pairs, one.laws.size, *needs], dtype=np.int64)
         pieces: list[NDArray[np.generic]] = [
             np.array(_stage(one.command)), counts, _padded(mode.rates, (size,)),
@@ -209,7 +212,11 @@ def packed(plant: Plant) -> Packed:
     onset = np.zeros(2)
     if plant.onset is not None and len(sets) > 1:
         onset[:] = _ONSETS[plant.onset.kind], plant.onset.value
-    return Packed(onset, *(np.stack(stack) for stack in stacks))
+    return Packed(onset, *(_stacked(stack) for stack in stacks))
+
+
+def _stacked(arrays: list[NDArray[np.generic]]) -> NDArray[Any]:
+    return arrays[0][None] if len(arrays) == 1 else np.stack(arrays)
 
 
 #: Bounds of the first step after a jump of the input [s].
@@ -217,5 +224,5 @@ FIRST = (5e-5, 5e-4)
 
 
 def _first_step(modes: Modes) -> float:
-    fastest = np.max(np.abs(modes.rates), initial=1.0)
-    return float(np.clip(0.4 / fastest, *FIRST))
+    fastest = max(1.0, float(np.abs(modes.rates).max(initial=1.0)))
+    return min(max(0.4 / fastest, FIRST[0]), FIRST[1])

@@ -93,6 +93,16 @@ def test_late_poses_are_late_in_heading_too(robot: Maker) -> None:
     np.testing.assert_array_equal(seen.column('yaw_rate'), truth.column('yaw_rate'))
 
 
+def test_a_ripple_does_not_drive_a_robot_that_rests(robot: Maker) -> None:
+    """A minute without a command: it stays where it is, and ripples when it drives."""
+    plant = robot(Effect('torque_ripple', 'left'), ripple_cos=3.0, ripple_sin=1.0)
+    still = trajectory(plant, series((0.0, 0.0, 0.0)), [60.0])
+    for name in ('x', 'y', 'heading', 'angle_left'):
+        assert still.column(name)[0] == 0.0
+    moving = trajectory(plant, series((0.0, 0.5, 0.0)), np.linspace(3.0, 6.0, 200))
+    assert np.ptp(moving.column('yaw_rate')) > 1e-3
+
+
 def test_a_late_set_begins_at_its_time_and_no_step_later(robot: Maker) -> None:
     """Stepped at 20 ms, with an onset in the middle of a step: half a step of it shows."""
     onset = Onset(OnsetKind.TIME, 0.51)
