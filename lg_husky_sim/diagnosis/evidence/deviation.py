@@ -30,7 +30,8 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: flo
 
     The other states are in balance at every moment: with x = (s, f), ``0 = A_fs s + A_ff f +
     E_f d``, so that ``s' = (A_ss - A_sf A_ff^-1 A_fs) s + (E_s - A_sf A_ff^-1 E_f) d``, and the
-    wheels read ``W s + W_d d`` likewise. Only for linear deviations from a simulation.
+    wheels read ``W s + W_d d`` likewise; voltages enter like d. Only for linear deviations from a
+    simulation.
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: flo
 
     Returns
     -------
-    numpy.ndarray, shape (20,)
+    numpy.ndarray, shape (28,)
         In the order of :data:`whitener.MODEL`.
     """
     one, states = plant.sets[0], plant.states
@@ -53,11 +54,14 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: flo
     inputs = np.column_stack([
         force, moment, *_axle_columns(states, {'wheel_inertia': wheel_inertia})])
     a_ff = one.a[np.ix_(fast, fast)]
+    inputs = np.hstack([inputs, one.b])
     follow = -np.linalg.solve(a_ff, np.hstack([one.a[np.ix_(fast, slow)], inputs[fast]]))
     a_sf = one.a[np.ix_(slow, fast)]
     a_slow = one.a[np.ix_(slow, slow)] + a_sf @ follow[:, :2]
     e_slow = inputs[slow] + a_sf @ follow[:, 2:]
     wheels = one.rows[:2, fast] @ follow
+    wheels[:, 6:] += one.rows_u[:2]
     wheels[:, :2] += one.rows[:2, slow]
     left, right = wheels[:, [0, 1, 4, 5]]
-    return np.concatenate([a_slow.ravel(), e_slow[0], e_slow[1], left, right])
+    return np.concatenate([a_slow.ravel(), e_slow[0, :4], e_slow[1, :4], left, right,
+                           e_slow[:, 4:].ravel(), wheels[:, 6:].ravel()])

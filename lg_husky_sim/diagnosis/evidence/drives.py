@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import enum
 from typing import Any, TypeVar
 
@@ -54,6 +54,7 @@ class Drive:
     start, end : float
         [s] on the recording's clock.
     commands : TimeSeries
+        That drive the robot.
     wheel_times, imu_times, pose_times : numpy.ndarray
         Stamps [s]; empty where a stream is missing.
     counted : bool
@@ -76,6 +77,10 @@ class Drive:
         Whether the robot is at rest at the start.
     stamped : bool
         Whether the commands carry stamps of their own, and not only the time of their receipt.
+    logged : TimeSeries
+        Commands as they were logged.
+    rounding : numpy.ndarray, shape (n,)
+        Variance by which each reading is rounded [its unit squared].
     """
 
     recording: str
@@ -97,6 +102,8 @@ class Drive:
     wheel_angles: tuple[float, float]
     still: bool
     stamped: bool = True
+    logged: TimeSeries = field(kw_only=True)
+    rounding: FloatArray = field(kw_only=True)
 
     @property
     def name(self) -> str:
@@ -163,6 +170,19 @@ def _derived(rates: TimeSeries, angles: TimeSeries) -> bool:
     # Rates that reading made of the angles, in the middle between their stamps: no measurement.
     middles = 0.5 * (angles.times[:-1] + angles.times[1:])
     return len(rates) > 3 and bool(np.mean(np.isin(rates.times, middles)) > 0.5)
+
+
+def _rounding(values: FloatArray) -> FloatArray:
+    # q^2/12, with the least step q between neighbours but for stray ones: of readings that are
+    # rounded, what they are rounded to; of others next to nothing. Readings that repeat each other
+    # are off by the same, and tell as much as one.
+    steps = np.abs(np.diff(values))
+    moved = steps > 0.0
+    if not np.any(moved):
+        return np.zeros(values.size)
+    quantum = float(np.quantile(steps[moved], setting('least_steps')))
+    run = np.concatenate([[0], np.cumsum(moved)])
+    return quantum ** 2 / 12.0 * np.bincount(run)[run]
 
 
 def _early(series: TimeSeries, start: float, names: Sequence[str]) -> list[float]:
@@ -250,7 +270,8 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
         np.concatenate([np.full(t.size, int(c), dtype=np.int64) for c, t, _ in pieces]),
         np.concatenate([t for _, t, _ in pieces]), heading, place,
         BodyTwist() if still else BodyTwist(forward, yaw), (0.0, 0.0) if still else rates,
-        begin, still, stamped)
+        begin, still, stamped, logged=streams['command'],
+        rounding=np.concatenate([_rounding(v) for _, _, v in pieces]))
 
 
 def drives_of(recordings: Sequence[Recording]) -> tuple[Drive, ...]:

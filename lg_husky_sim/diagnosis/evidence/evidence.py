@@ -22,9 +22,15 @@ from functools import cached_property
 from lg_husky_sim.diagnosis.evidence.deviation import slow_model
 from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.frames import frame_of
-from lg_husky_sim.diagnosis.evidence.missed_commands import with_missed_commands
-from lg_husky_sim.diagnosis.evidence.noise import fit_noise, Noise, Whitener, whitener_of
+from lg_husky_sim.diagnosis.evidence.noise import (
+    reach_of,
+    fit_noise,
+    Noise,
+    Whitener,
+    whitener_of,
+)
 from lg_husky_sim.diagnosis.evidence.observation import Motion, observe, Reading, simulate
+from lg_husky_sim.diagnosis.evidence.repaired_commands import repaired
 from lg_husky_sim.diagnosis.evidence.unknowns import start_of, Unknown, values_of
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
@@ -292,15 +298,32 @@ class Evidence:
         -------
         Evidence
         """
-        frames = [frame_of(d, m, p, fit.point.log) for d, m, p in zip(
-            self.drives, self.motions(fit.point, True), fit.predicted, strict=True)]
-        if len(self.whiteners) == len(frames):
-            frames = with_missed_commands(frames, self.whiteners, fit.whitened)
+        plants = self.plants(fit.point.plant)
+        drives = self._repaired(fit, plants)
+        predicted = [p if d is old else observe(simulate(plant, d, fit.point.log), d,
+                                                fit.point.log)
+                     for d, old, plant, p in zip(drives, self.drives, plants, fit.predicted,
+                                                 strict=True)]
+        frames = [frame_of(d, plant, simulate(plant, d, fit.point.log, True), p, fit.point.log,
+                           reach_of(self.noise))
+                  for d, plant, p in zip(drives, plants, predicted, strict=True)]
         models = self.deviations(fit.point)
-        residuals = [d.measured - p for d, p in zip(self.drives, fit.predicted, strict=True)]
+        residuals = [d.measured - p for d, p in zip(drives, predicted, strict=True)]
         noise = fit_noise(self.noise, frames, models, residuals, self.pool, rounds)
         whiteners = [whitener_of(f, m, noise) for f, m in zip(frames, models, strict=True)]
-        return Evidence(self.drives, self.names, noise, whiteners, self.pool)
+        return Evidence(drives, self.names, noise, whiteners, self.pool)
+
+    def _repaired(self, fit: Fit, plants: Sequence[Plant]) -> list[Drive]:
+        # The drives with the commands that their bases seem to have got.
+        ends = np.cumsum([d.measured.size for d in self.drives])
+        log = fit.point.log
+
+        def one_of(number: int) -> Drive:
+            drive, whitener = self.drives[number], self.whiteners[number]
+            whitened = fit.whitened[ends[number] - drive.measured.size:ends[number]]
+            return repaired(drive, whitener, whitened, lambda other: whitener.apply(
+                other.measured - observe(simulate(plants[number], other, log), other, log)))
+        return list(self.pool.map(one_of, range(len(self.drives))))
 
     def deviations(self, point: Point) -> list[FloatArray]:
         """Return the deviation model of each drive."""
@@ -319,8 +342,8 @@ def evidence_of(drives: Sequence[Drive], names: Sequence[str], point: Point, noi
     blank = Evidence(drives, names, noise, (), pool)
     motions = blank.motions(point, True)
     predicted = [observe(m, d, point.log) for m, d in zip(motions, drives, strict=True)]
-    frames = [frame_of(d, m, p, point.log) for d, m, p in zip(
-        drives, motions, predicted, strict=True)]
+    frames = [frame_of(d, plant, m, p, point.log, reach_of(noise)) for d, plant, m, p in zip(
+        drives, blank.plants(point.plant), motions, predicted, strict=True)]
     models = blank.deviations(point)
     return Evidence(drives, names, noise, [
         whitener_of(f, m, noise) for f, m in zip(frames, models, strict=True)], pool)

@@ -14,6 +14,7 @@ from lg_husky_sim.diagnosis.evidence.observation import (
     wheel_lag,
 )
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -34,8 +35,9 @@ class Frame:
         Direction of the base at each reading.
     slopes : numpy.ndarray, shape (n,)
         Rate of change of each reading [its unit/s].
-    kicks : numpy.ndarray, shape (n_kicks, 3)
-        Times at which a command seems lost [s], and variances of the wheels' rates [(rad/s)²].
+    kicks : numpy.ndarray, shape (n_kicks, 6)
+        Times of commands [s], variances of the wheels' rates where one seems lost [(rad/s)²],
+        steps of the voltages [V], and how far from its time a step may come [s].
     """
 
     drive: Drive
@@ -47,17 +49,22 @@ class Frame:
     kicks: FloatArray
 
 
-def frame_of(drive: Drive, motion: Motion, predicted: FloatArray, reading: Reading) -> Frame:
+def frame_of(drive: Drive, plant: Plant, motion: Motion, predicted: FloatArray,
+             reading: Reading, reach: float) -> Frame:
     """
     Return the frame of a drive, from a simulation of it.
 
     Parameters
     ----------
     drive : Drive
+    plant : Plant
+        Whose command stage makes voltages of commands.
     motion : Motion
     predicted : numpy.ndarray, shape (n,)
         Observed of the motion.
     reading : Reading
+    reach : float
+        How much earlier or later than on the mean a command may come [s].
     """
     times = np.array(drive.times)
     lag = wheel_lag(reading)
@@ -71,7 +78,8 @@ def frame_of(drive: Drive, motion: Motion, predicted: FloatArray, reading: Readi
         part = drive.slice_of(channel)
         if part.stop - part.start > 3:
             slopes[part] = _slopes(drive.times[part], predicted[part])
-    kicks = _lost_commands(drive, motion)
+    kicks = np.vstack([_lost_commands(drive, motion), _steps(drive, plant, reading, reach)])
+    kicks = kicks[np.argsort(kicks[:, 0], kind='stable')]
     order = np.argsort(times, kind='stable')
     return Frame(drive, times, order, np.cos(heading), np.sin(heading), slopes, kicks)
 
@@ -102,6 +110,21 @@ def _lost_commands(drive: Drive, motion: Motion) -> FloatArray:
                 before, after = np.interp([begin, end + usual], probe_times(drive),
                                           motion.column(f'wheel_{side}', 'probe'))
                 steps.append((0.5 * (after - before)) ** 2)
-            found += [[begin, *steps], [end, *steps]]
-    kicks = np.array(found).reshape(-1, 3)
-    return kicks[np.argsort(kicks[:, 0], kind='stable')]
+            found += [[begin, *steps, 0.0, 0.0, 0.0], [end, *steps, 0.0, 0.0, 0.0]]
+    return np.array(found).reshape(-1, 6)
+
+
+def _steps(drive: Drive, plant: Plant, reading: Reading, reach: float) -> FloatArray:
+    # Steps of the voltages at the commands, where the command stage puts them.
+    stage = plant.sets[0].command
+    values = drive.commands.values
+    if not len(values):
+        return np.zeros((0, 6))
+    forward = stage.volts_per_speed * np.clip(
+        values[:, 0], -stage.limit_forward, stage.limit_forward)
+    turn = stage.volts_per_rate * np.clip(values[:, 1], -stage.limit_yaw, stage.limit_yaw)
+    steps = np.diff(np.column_stack([forward - turn, forward + turn]), axis=0)
+    times = drive.commands.times[1:] + reading.get('command_delay') + stage.latency
+    moved = np.any(steps != 0.0, axis=1)
+    return np.column_stack([times, np.zeros((times.size, 2)), steps,
+                            np.full(times.size, reach)])[moved]

@@ -3,8 +3,8 @@
 """
 Noise: what nobody can predict, at the balances of the graph and in the sensors.
 
-The variance of a sensor's reading is ``sigma^2 + sigma_t^2 (dy/dt)^2``: a stamp that is off by
-sigma_t leaves an error of that slope. Intensities are found by maximum likelihood.
+The variance of a sensor's reading is ``sigma^2 + q^2 / 12 + sigma_t^2 (dy/dt)^2``: one that is
+rounded to q is off by q/sqrt(12), by the same when it repeats, and a stamp that is off by sigma_t leaves an error of that slope. Intensities are found by maximum likelihood.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ import numpy as np
 #: What is estimated; the values are logarithms of positive numbers.
 NAMES = ('force', 'moment', 'drive', 'force_time', 'moment_time', 'drive_time', 'place_walk',
          'heading_walk', 'wheel', 'wheel_jitter', 'gyro', 'imu_jitter', 'place', 'heading',
-         'pose_jitter')
+         'pose_jitter', 'command_jitter')
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,8 @@ class Noise:
     values : mapping of str to float
         Force [N], moment and drive [N·m] (standard deviations), their time constants [s], walks
         of place [m/sqrt(s)] and heading [rad/sqrt(s)], sensors: wheel [rad/s or rad], gyro
-        [rad/s], place [m], heading [rad], and jitter of the stamps of each stream [s].
+        [rad/s], place [m], heading [rad], and jitter of the stamps of each stream and of
+        commands [s].
     """
 
     values: Mapping[str, float]
@@ -53,6 +54,11 @@ class Noise:
         """Return the process vector of the whitener."""
         known = {**self.values, 'bias_walk': setting('bias_walk')}
         return np.array([known[name] for name in PROCESS])
+
+
+def reach_of(noise: Noise) -> float:
+    """Return how far from the mean delay that of a base at its own rate may be [s]."""
+    return setting('late_by_jitter') * noise.values['command_jitter']
 
 
 def sensor_variance(frame: Frame, noise: Noise) -> FloatArray:
@@ -67,7 +73,7 @@ def sensor_variance(frame: Frame, noise: Noise) -> FloatArray:
     out = np.empty(frame.times.size)
     for channel, (level, jitter) in size.items():
         part = frame.drive.slice_of(channel)
-        out[part] = (values[level] ** 2 + (values[jitter] * frame.slopes[part]) ** 2)
+        out[part] = (frame.drive.rounding[part] + values[level] ** 2 + (values[jitter] * frame.slopes[part]) ** 2)
     return out
 
 
@@ -150,7 +156,7 @@ def whitener_of(frame: Frame, model: FloatArray, noise: Noise) -> Whitener:
     initial[8:10] = setting('start_place') ** 2
     initial[10:12] = setting('start_angle') ** 2
     kicks = np.array(frame.kicks)
-    kicks[:, 1:] /= np.array([model[MODEL.index('left_by_left')],
+    kicks[:, 1:3] /= np.array([model[MODEL.index('left_by_left')],
                               model[MODEL.index('right_by_right')]]) ** 2
     gains(frame.times, frame.drive.channels, frame.order, variance, frame.cosine, frame.sine,
           model, process, initial, setting('longest_step'), kicks, gain, scale)

@@ -46,6 +46,7 @@ class Reading:
         for a rate of the moment.
     values : mapping of str to float
         ``wheel_window`` [s] (length of the window, or time constant of the low pass),
+        ``imu_window`` [s] (length of the window of a yaw rate; its period if not given),
         ``delay_wheels``, ``delay_imu``, ``delay_pose`` [s] (how late stamps are),
         ``command_delay`` [s] (how late the base applies commands), ``gyro_offset`` [rad/s],
         ``gyro_gain`` [1] (relative), ``pose_turn`` [rad] (heading of the pose's frame against the
@@ -146,9 +147,9 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
         begins = ends - window
     imu_begins = imu[:0]
     if reading.imu is not None and imu.size > 3:
-        period = float(np.median(np.diff(imu)))
-        imu = imu + reading.imu * period
-        imu_begins = imu - period
+        window = reading.values.get('imu_window', float(np.median(np.diff(drive.imu_times))))
+        imu = imu + reading.imu * window
+        imu_begins = imu - window
     groups = {'wheels': ends, 'begins': begins, 'imu': imu, 'pose': pose,
               'imu_begins': imu_begins, 'probe': probe_times(drive) if probe else ends[:0]}
     parts, place = {}, 0
@@ -187,7 +188,7 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
               sensors.delay_imu + reading.get('delay_imu'),
               sensors.delay_pose + reading.get('delay_pose'))
     key = (reading.wheels, reading.imu, reading.get('wheel_window'),
-           reading.get('command_delay'), delays, probe)
+           reading.values.get('imu_window'), reading.get('command_delay'), delays, probe)
     wanted = drive.remembered(key, lambda: _wanted(drive, reading, delays, probe))
     propagator = Propagator(plant)
     events = wanted.events
@@ -240,6 +241,12 @@ def wheel_lag(reading: Reading) -> float:
     share = {WheelReading.WINDOW_END: 0.5, WheelReading.WINDOW_MIDDLE: 0.0,
              WheelReading.WINDOW_START: -0.5, WheelReading.FILTERED: 1.0}[reading.wheels]
     return reading.get('delay_wheels') + share * window
+
+
+def imu_lag(reading: Reading, period: float) -> float:
+    """Return how long before its stamp a yaw rate was true, on the mean [s]."""
+    window = 0.0 if reading.imu is None else reading.values.get('imu_window', period)
+    return reading.get('delay_imu') + (0.5 - (reading.imu or 0.0)) * window
 
 
 def observe(motion: Motion, drive: Drive, reading: Reading) -> FloatArray:

@@ -34,11 +34,15 @@ MODEL = ('speed_by_speed', 'speed_by_turn', 'turn_by_speed', 'turn_by_turn',
          'speed_by_force', 'speed_by_moment', 'speed_by_left', 'speed_by_right',
          'turn_by_force', 'turn_by_moment', 'turn_by_left', 'turn_by_right',
          'left_by_speed', 'left_by_turn', 'left_by_left', 'left_by_right',
-         'right_by_speed', 'right_by_turn', 'right_by_left', 'right_by_right')
+         'right_by_speed', 'right_by_turn', 'right_by_left', 'right_by_right',
+         'speed_by_voltage_left', 'speed_by_voltage_right', 'turn_by_voltage_left',
+         'turn_by_voltage_right', 'left_by_voltage_left', 'left_by_voltage_right',
+         'right_by_voltage_left', 'right_by_voltage_right')
 #: Entries of the process vector: standard deviations of the disturbances [N, N·m, N·m], their
-#: time constants [s], and root intensities of bias [rad/s/sqrt(s)] and place [m/sqrt(s)].
+#: time constants [s], root intensities of bias [rad/s/sqrt(s)], place [m/sqrt(s)] and heading
+#: [rad/sqrt(s)], and the jitter of commands [s].
 PROCESS = ('force', 'moment', 'drive', 'force_time', 'moment_time', 'drive_time', 'bias_walk',
-           'place_walk', 'heading_walk')
+           'place_walk', 'heading_walk', 'command_jitter')
 
 
 @jit_part
@@ -110,9 +114,11 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
         Variances of the deviation at the first time.
     longest : float
         Longest step of a propagation [s].
-    kicks : numpy.ndarray, shape (n_kicks, 3)
+    kicks : numpy.ndarray, shape (n_kicks, 6)
         Times [s], in order, at which the torques on the left and right wheels become uncertain
-        by so much more [(N·m)²].
+        by so much more [(N·m)²], and steps of the voltages there [V]: a step that comes by s
+        later leaves s times what the voltages accelerate and how fast they turn the wheels. Last
+        how far from its time a step may come [s]: readings in this time tell nothing of it.
     gain : numpy.ndarray, shape (n, 12)
         Receives the gains, in the order of time.
     scale : numpy.ndarray, shape (n,)
@@ -122,6 +128,7 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
     for i in range(12):
         p[i, i] = initial[i]
     column = np.zeros((12, 1))
+    late, moved, of_late = np.zeros(4), (4, 5, 10, 11), (-1, 2, 6, 7)
     force_time, moment_time, drive_time = process[3], process[4], process[5]
     now = times[order[0]]
     kick = 0
@@ -132,11 +139,18 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
         left = times[reading] - now
         while left > 1e-9:
             dt = min(left, longest)
-            if kick < kicks.shape[0] and kicks[kick, 0] <= times[reading] - left:
+            while kick < kicks.shape[0] and kicks[kick, 0] + kicks[kick, 5] <= now + dt:
                 p[2, 2] += kicks[kick, 1]
                 p[3, 3] += kicks[kick, 2]
+                for i in range(4):
+                    late[i] = process[9] * (model[20 + 2 * i] * kicks[kick, 3]
+                                            + model[21 + 2 * i] * kicks[kick, 4])
+                for i in range(4):
+                    for j in range(4):
+                        p[moved[i], moved[j]] += late[i] * late[j]
                 kick += 1
             left -= dt
+            now += dt
             fade_f = np.exp(-dt / force_time)
             fade_m = np.exp(-dt / moment_time)
             fade_d = np.exp(-dt / drive_time)
@@ -158,7 +172,16 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
         for i in range(12):
             # p is symmetric: H p by columns is p H'.
             column[i, 0] = _read(p, i, channel, model)
-        variance = _read(column, 0, channel, model) + noise[reading]
+        unsure = noise[reading]
+        near = kick
+        while near < kicks.shape[0] and kicks[near, 0] - kicks[near, 5] <= now:
+            for i in range(4):
+                if channel == of_late[i]:
+                    step = process[9] * (model[20 + 2 * i] * kicks[near, 3]
+                                         + model[21 + 2 * i] * kicks[near, 4])
+                    unsure += step * step
+            near += 1
+        variance = _read(column, 0, channel, model) + unsure
         for i in range(12):
             gain[k, i] = column[i, 0] / variance
         for i in range(12):

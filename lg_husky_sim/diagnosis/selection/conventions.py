@@ -4,21 +4,33 @@
 How a log was made, found by the likelihood of the recalibrated model.
 
 Wheel rates may be of the moment, means over a window with the stamp at its end, middle or begin,
-or low-passed; a yaw rate may be of the moment or a mean over its period. An offset of the stamps
-that comes with the smoothing of its window is a convention, one without is late.
+or low-passed; so may a yaw rate. An offset of the stamps that comes with the smoothing of its
+window is a convention, one without is late.
+
+A first-order low pass of time constant tau delays by tau and smooths with a variance of tau^2. To
+second order in tau this is the mean over a window of sqrt(12) tau that begins
+``(1/2 + 1/sqrt(12)) sqrt(12) tau`` before the stamp.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+import math
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
-from lg_husky_sim.diagnosis.evidence.observation import Reading, WheelReading
+from lg_husky_sim.diagnosis.evidence.observation import (
+    imu_lag,
+    Reading,
+    wheel_lag,
+    WheelReading,
+)
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Reading of the wheels, place of the gyro's stamp in its window, window of the wheels [s].
-Change = tuple[WheelReading, float | None, float]
+#: Where in the window of its mean a low-passed yaw rate is stamped.
+LOW_PASS = 0.5 - 1.0 / math.sqrt(12.0)
 
 
 def best_reading(evidence: Evidence, fit: Fit) -> Fit:
@@ -36,46 +48,61 @@ def best_reading(evidence: Evidence, fit: Fit) -> Fit:
     Fit
         With that reading, under the same noise; the given one where none is better.
     """
-    chosen = fit
-    for options_of in (_wheel_options, _imu_options):
-        # One after the other: a fit has work for all threads itself.
-        tried = [_refitted(evidence, chosen, change)
-                 for change in options_of(evidence, chosen.point.reading)]
-        best = min(tried, key=lambda one: one.cost, default=chosen)
-        if best.cost < chosen.cost - setting('reading_gain'):
-            chosen = best
-    if chosen.point.reading.wheels is not fit.point.reading.wheels or (
-            chosen.point.reading.get('wheel_window') != fit.point.reading.get('wheel_window')):
-        window = chosen.point.reading.get('wheel_window')
-        tried = [_refitted(evidence, chosen, (chosen.point.reading.wheels,
-                                              chosen.point.reading.imu, factor * window))
-                 for factor in (0.7, 0.85, 1.18, 1.4)]
-        chosen = min([chosen, *tried], key=lambda one: one.cost)
-    return chosen
+    chosen = _better(evidence, fit, 'wheel_window', _wheel_options)
+    return _better(evidence, chosen, 'imu_window', _imu_options)
 
 
-def _refitted(evidence: Evidence, fit: Fit, change: Change) -> Fit:
-    wheels, imu, window = change
-    reading: Reading = replace(fit.point.reading, wheels=wheels, imu=imu).replacing(
-        {'wheel_window': window})
-    return evidence.fit(replace(fit.point, reading=reading), fit.slopes, rounds=2)
+def _better(evidence: Evidence, fit: Fit, window: str,
+            options_of: Callable[[Evidence, Reading], Sequence[Reading]]) -> Fit:
+    # One after the other: a fit has work for all threads itself.
+    tried = [_refitted(evidence, fit, one) for one in options_of(evidence, fit.point.reading)]
+    best = min(tried, key=lambda one: one.cost, default=fit)
+    if best.cost > fit.cost - setting('reading_gain'):
+        return fit
+    length = best.point.reading.values.get(window)
+    if length is None:
+        return best
+    tried = [_refitted(evidence, best, best.point.reading.replacing({window: factor * length}))
+             for factor in (0.7, 0.85, 1.18, 1.4)]
+    return min([best, *tried], key=lambda one: one.cost)
 
 
-def _wheel_options(evidence: Evidence, now: Reading) -> list[Change]:
-    if not any(d.wheel_times.size and not d.counted for d in evidence.drives):
+def _refitted(evidence: Evidence, fit: Fit, reading: Reading) -> Fit:
+    # With as late a stream on the whole as before: what the reading is late, its stamps are not.
+    now = fit.point.log
+    other = replace(reading, values={**now.values, **reading.values})
+    period = _period([d.imu_times for d in evidence.drives if d.imu_times.size > 3] or [
+        np.zeros(2)])
+    spared = {'delay_wheels': wheel_lag(now) - wheel_lag(other),
+              'delay_imu': imu_lag(now, period) - imu_lag(other, period)}
+    places = np.array([place + spared.get(u.name, 0.0) if u.kind == 'log' else place
+                       for u, place in zip(fit.point.unknowns, fit.point.places, strict=True)])
+    return evidence.fit(replace(fit.point, reading=reading).at(places), fit.slopes, rounds=2)
+
+
+def _period(times: Sequence[FloatArray]) -> float:
+    return float(np.median([np.median(np.diff(t)) for t in times]))
+
+
+def _wheel_options(evidence: Evidence, now: Reading) -> list[Reading]:
+    times = [d.wheel_times for d in evidence.drives if d.wheel_times.size > 3 and not d.counted]
+    if not times:
         return []
-    periods = [float(np.median(np.diff(d.wheel_times))) for d in evidence.drives
-               if d.wheel_times.size > 3]
     longest = setting('longest_window')
-    windows = sorted({w for w in (0.005, 0.01, 0.04, 0.08, longest, *np.round(
-        [np.median(periods)], 4).tolist()) if w <= longest})
-    found: list[Change] = [(WheelReading.WINDOW_END, now.imu, setting('shortest_window'))]
+    windows = sorted({w for w in (0.005, 0.01, 0.04, 0.08, longest, round(_period(times), 4))
+                      if w <= longest})
+    found = [replace(now, wheels=WheelReading.WINDOW_END).replacing(
+        {'wheel_window': setting('shortest_window')})]
     for window in windows:
-        found += [(kind, now.imu, window) for kind in WheelReading]
+        found += [replace(now, wheels=kind).replacing({'wheel_window': window})
+                  for kind in WheelReading]
     return found
 
 
-def _imu_options(evidence: Evidence, now: Reading) -> list[Change]:
-    if not any(d.imu_times.size for d in evidence.drives):
+def _imu_options(evidence: Evidence, now: Reading) -> list[Reading]:
+    times = [d.imu_times for d in evidence.drives if d.imu_times.size > 3]
+    if not times:
         return []
-    return [(now.wheels, place, now.get('wheel_window')) for place in (0.0, 0.5, 1.0)]
+    return [replace(now, imu=place).replacing({'imu_window': window})
+            for window in (0.01, 0.04, round(_period(times), 4))
+            for place in (0.0, 0.5, 1.0, LOW_PASS)]

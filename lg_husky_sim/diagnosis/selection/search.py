@@ -141,7 +141,7 @@ def with_jitter(point: Point, evidence: Evidence) -> Point:
     """Return a point whose delays may be as large as the jitter of the stamps suggests."""
     noise = evidence.noise.values
     unknowns = loosened(point.unknowns, {
-        'command_delay': noise['wheel_jitter'], 'delay_wheels': noise['wheel_jitter'],
+        'command_delay': noise['command_jitter'], 'delay_wheels': noise['wheel_jitter'],
         'delay_imu': noise['imu_jitter'], 'delay_pose': noise['pose_jitter']})
     return replace(point, unknowns=unknowns).at(point.places)
 
@@ -305,7 +305,7 @@ def _fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequen
 
 def _as_logged(evidence: Evidence, base: Fit) -> tuple[Evidence, Fit, bool]:
     # A missing effect can pass for another reading of the sensors. Where an effect promises more
-    # than the reading gains, the reading waits until the effect is in the model.
+    # than the reading gains, the reading waits for what the effect really gains.
     chosen = best_reading(evidence, base)
     if chosen is base:
         return evidence, base, False
@@ -346,17 +346,26 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     start = with_jitter(replace(start, reading=base.point.reading), evidence)
     plain, rounds, found = base, [], []
     least = 0.0
-    for number in range(int(setting('most_effects'))):
+    while len(rounds) < int(setting('most_effects')):
+        number = len(rounds)
         progress(f'looking for effect {number + 1}', 0.1 + 0.25 * number)
-        nominal = start if number == 0 else None
-        one = play_round(evidence, base, hypotheses(base.point.structure), nominal,
-                         least)
-        rounds.append(one)
+        one = play_round(evidence, base, hypotheses(base.point.structure),
+                         None if found else start, least)
+        best = one.tried[0] if one.tried else None
         evidence = one.evidence
+        adopted = best is not None and one.adopted and best.gain >= least
+        if postponed and not found:
+            chosen = best_reading(evidence, one.base)
+            if not adopted or best is None or one.base.cost - chosen.cost >= best.gain:
+                # The log was made otherwise, or else nothing says so: look again.
+                postponed = False
+                evidence, base = _read_as(evidence, one.base, chosen)
+                start = with_jitter(replace(start, reading=base.point.reading), evidence)
+                continue
+        rounds.append(one)
         if number == 0:
             plain = one.base
-        best = one.tried[0] if one.tried else None
-        if best is None or not one.adopted or best.gain < least:
+        if not adopted or best is None:
             base = one.base
             break
         found.append(best.hypothesis)

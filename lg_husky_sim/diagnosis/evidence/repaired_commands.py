@@ -1,0 +1,126 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Single commands that a base missed, or that a log lost, by what its wheels did after them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
+from lg_husky_sim.diagnosis.evidence.noise import Whitener
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray, TimeSeries
+import numpy as np
+
+#: Innovations of a drive when its base is driven by other commands than those of the log.
+Score = Callable[[Drive], FloatArray]
+
+
+def repaired(drive: Drive, whitener: Whitener, whitened: FloatArray, score: Score) -> Drive:
+    """
+    Return a drive with the commands that its base seems to have got.
+
+    Where the wheels leave a simulation by far more than noise, a command is taken out, or put into
+    a gap between those before and after it, if that makes the drive likelier by a stated gain. Of
+    few commands only: up to a stated share.
+
+    Parameters
+    ----------
+    drive : Drive
+    whitener : Whitener
+        That made the innovations.
+    whitened : numpy.ndarray, shape (n,)
+        Of the drive, in the order of time.
+    score : callable
+        Returns the innovations with other commands.
+
+    Returns
+    -------
+    Drive
+    """
+    stamps = drive.logged.times
+    if stamps.size <= 3:
+        return drive
+    most = int(setting('missed_share') * stamps.size) + 1
+    plain = drive if drive.commands is drive.logged else replace(drive, commands=drive.logged)
+    order = whitener.frame.order
+    wheel = drive.channels[order] != int(Channel.X)
+    for known in (Channel.Y, Channel.HEADING):
+        wheel &= drive.channels[order] != int(known)
+    e = whitened if drive is plain else score(plain)
+    best, cost = plain, _cost(e)
+    tried: set[int] = set()
+    for _ in range(most):
+        far = wheel & (np.abs(e) > setting('far'))
+        if not np.any(far):
+            break
+        found = None
+        for place in _suspects(whitener.frame.times[order][far], np.abs(e[far]), stamps):
+            if place in tried:
+                continue
+            tried.add(place)
+            for other, innovations in _others(best, float(stamps[place]), score):
+                if cost - _cost(innovations) > setting('missed_gain'):
+                    found, e, cost = other, innovations, _cost(innovations)
+            if found is not None:
+                break
+        if found is None:
+            break
+        best = found
+    return best
+
+
+def _cost(whitened: FloatArray) -> float:
+    nu = setting('student')
+    return float(np.sum(0.5 * (nu + 1.0) * np.log1p(whitened * whitened / nu)))
+
+
+def _suspects(times: FloatArray, sizes: FloatArray, stamps: FloatArray) -> list[int]:
+    # The last command before each reading that is far off and the one before that, by how much
+    # is far off after them; at most as many as are worth a simulation.
+    last = np.clip(np.searchsorted(stamps, times, side='right') - 1, 0, stamps.size - 1)
+    weight = np.bincount(last, np.log1p(sizes ** 2), minlength=stamps.size)
+    worst = np.argsort(-weight, kind='stable')[:int(setting('suspects'))]
+    found: list[int] = []
+    for place in worst[weight[worst] > 0.0].tolist():
+        found += [one for one in (place, place - 1) if one > 0 and one not in found]
+    return found
+
+
+def _others(drive: Drive, stamp: float, score: Score) -> Iterator[tuple[Drive, FloatArray]]:
+    # Without the command at a stamp; and with one in the middle of the gap after it.
+    commands = drive.commands
+    place = int(np.argmin(np.abs(commands.times - stamp)))
+    keep = np.arange(commands.times.size) != place
+    without = replace(drive, commands=TimeSeries(
+        commands.times[keep], commands.values[keep], commands.names))
+    yield without, score(without)
+    gaps = np.diff(commands.times)
+    usual = float(np.median(gaps))
+    if place < gaps.size and setting('lost_gap') * usual < gaps[place] < (
+            setting('pause') * usual):
+        yield _filled(drive, place, int(round(gaps[place] / usual)) - 1, score)
+
+
+def _filled(drive: Drive, place: int, count: int, score: Score) -> tuple[Drive, FloatArray]:
+    # With so many commands in a gap, between those before and after it but for what the readings
+    # say that they were: linear in both numbers.
+    commands = drive.commands
+    before, after = commands.values[place:place + 2]
+    parts = np.arange(1, count + 1)[:, None] / (count + 1.0)
+    times = commands.times[place] + parts[:, 0] * (
+        commands.times[place + 1] - commands.times[place])
+
+    def other(shift: FloatArray) -> Drive:
+        values = before + parts * (after - before) + shift
+        return replace(drive, commands=TimeSeries(
+            np.insert(commands.times, place + 1, times),
+            np.insert(commands.values, place + 1, values, axis=0), commands.names))
+    plain = other(np.zeros(2))
+    e = score(plain)
+    step = np.maximum(np.abs(after - before), setting('still_speed'))
+    slopes = np.column_stack([score(other(row)) - e for row in np.diag(step)])
+    normal = slopes.T @ slopes + np.eye(2)
+    shifted = other(-step * np.linalg.solve(normal, slopes.T @ e))
+    return shifted, score(shifted)
