@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 import math
 
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
 from lg_husky_sim.diagnosis.evidence.observation import (
     imu_lag,
     Reading,
@@ -55,19 +55,36 @@ def best_reading(evidence: Evidence, fit: Fit) -> Fit:
 def _better(evidence: Evidence, fit: Fit, window: str,
             options_of: Callable[[Evidence, Reading], Sequence[Reading]]) -> Fit:
     # One after the other: a fit has work for all threads itself.
-    tried = [_refitted(evidence, fit, one) for one in options_of(evidence, fit.point.reading)]
+    options = options_of(evidence, fit.point.reading)
+    points = [_read_so(evidence, fit, one) for one in options]
+    promised = evidence.pool.map(_promise_of(evidence, fit), points)
+    order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
+    tried = [evidence.fit(points[place], fit.slopes, rounds=2) for place in order]
     best = min(tried, key=lambda one: one.cost, default=fit)
     if best.cost > fit.cost - setting('reading_gain'):
         return fit
     length = best.point.reading.values.get(window)
     if length is None:
         return best
-    tried = [_refitted(evidence, best, best.point.reading.replacing({window: factor * length}))
-             for factor in (0.7, 0.85, 1.18, 1.4)]
+    tried = [evidence.fit(_read_so(evidence, best, best.point.reading.replacing(
+        {window: factor * length})), best.slopes, rounds=2) for factor in (0.7, 0.85, 1.18, 1.4)]
     return min([best, *tried], key=lambda one: one.cost)
 
 
-def _refitted(evidence: Evidence, fit: Fit, reading: Reading) -> Fit:
+def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
+    # What a fit would cost after one step from a point, with the derivatives of this one.
+    nu = setting('student')
+
+    def promise(point: Point) -> float:
+        e = evidence.residuals(evidence.predict(point))
+        weight = (nu + 1.0) / (nu + e * e)
+        normal = (fit.jacobian * weight[:, None]).T @ fit.jacobian + np.diag(point.weights ** 2)
+        slope = fit.jacobian.T @ (weight * e) - point.weights * point.strain
+        return evidence.cost(e, point) - 0.5 * float(slope @ np.linalg.solve(normal, slope))
+    return promise
+
+
+def _read_so(evidence: Evidence, fit: Fit, reading: Reading) -> Point:
     # With as late a stream on the whole as before: what the reading is late, its stamps are not.
     now = fit.point.log
     other = replace(reading, values={**now.values, **reading.values})
@@ -77,7 +94,7 @@ def _refitted(evidence: Evidence, fit: Fit, reading: Reading) -> Fit:
               'delay_imu': imu_lag(now, period) - imu_lag(other, period)}
     places = np.array([place + spared.get(u.name, 0.0) if u.kind == 'log' else place
                        for u, place in zip(fit.point.unknowns, fit.point.places, strict=True)])
-    return evidence.fit(replace(fit.point, reading=reading).at(places), fit.slopes, rounds=2)
+    return replace(fit.point, reading=reading).at(places)
 
 
 def _period(times: Sequence[FloatArray]) -> float:

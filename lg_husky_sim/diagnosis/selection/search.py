@@ -223,7 +223,7 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         best = tried[0]
         evidence = evidence.renoised(best.fit)
         points = [base.point] + ([nominal] if nominal is not None else [])
-        base = min((evidence.fit(p) for p in points), key=lambda f: f.cost)
+        base = min((evidence.fit(p, base.slopes) for p in points), key=lambda f: f.cost)
         seen = _looks(evidence, base, pool, [t.hypothesis.effect for t in tried])
         chosen = list(seen[:few])
         known = {one.hypothesis.label for one in chosen}
