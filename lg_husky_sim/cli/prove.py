@@ -40,12 +40,15 @@ if TYPE_CHECKING:
 @click.option('--from', 'sources', multiple=True, metavar='FILE.jsonl',
               type=click.Path(path_type=Path, exists=True, dir_okay=False),
               help='Outcomes of earlier trials: make tables and page from them; simulate nothing.')
+@click.option('--calibrate', is_flag=True,
+              help='With --from: print the coefficients of the confidence that these outcomes '
+                   'make likeliest, as they stand in diagnosis.yaml.')
 @click.option('--page', type=click.Path(path_type=Path), metavar='FILE.md',
               help='Also write the results as a page, with pictures and outcomes beside it.')
 def command(
     cases: int, seed: int | None, tuning: bool, world: str, jobs: int, out: Path | None,
     given: Path | None, held_out: bool, generate_only: bool, score_only: bool,
-    sources: tuple[Path, ...], page: Path | None,
+    sources: tuple[Path, ...], calibrate: bool, page: Path | None,
 ) -> None:
     """
     Try the diagnosis blind on robots with hidden physics.
@@ -58,6 +61,15 @@ def command(
     from lg_husky_sim.errors import CommandError
     from lg_husky_sim.proof import outcomes
 
+    if calibrate and not sources:
+        raise CommandError('--calibrate needs --from FILE.jsonl: outcomes to calibrate on')
+    if sources and calibrate:
+        from lg_husky_sim.proof.calibration import calibrated
+
+        rows = [row for path in sources for row in outcomes.read(path)[1]]
+        for name, (value, cases, right) in calibrated(rows).items():
+            click.echo(f'{name}: {value:.2f}  # {right} of {cases} right')
+        return
     if sources:
         if out or given or generate_only or score_only:
             raise CommandError('--from makes figures of earlier trials; it goes with --page only')

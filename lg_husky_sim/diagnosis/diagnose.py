@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from lg_husky_sim.diagnosis.conclusion import (
     answer,
@@ -123,7 +123,7 @@ def _diagnosis(found: Search, rest: Sequence[Effort], parts: Sequence[Segment],
         plain_out, augmented_out, _remaining(found, rest),
         _model(found.final, found.evidence, nominal, about),
         _model(found.plain, found.evidence, nominal, 'recalibrated, nothing added'),
-        _notes(found, plain_out, augmented_out))
+        _notes(found, plain_out, augmented_out), asdict(said.features))
     return diagnosis, said.features
 
 

@@ -157,6 +157,8 @@ class Diagnosis:
     plain_model : ModelFile
         Recalibrated only.
     notes : tuple of str
+    features : mapping of str to float
+        What the confidence was made of, by name.
     """
 
     verdict: Verdict
@@ -173,6 +175,7 @@ class Diagnosis:
     model: ModelFile
     plain_model: ModelFile
     notes: tuple[str, ...] = field(default=())
+    features: Mapping[str, float] = field(default_factory=dict)
 
 
 def _number(value: float) -> float | None:
@@ -237,6 +240,7 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
         'schema': SCHEMA,
         'verdict': diagnosis.verdict.value,
         'confidence': _number(diagnosis.confidence),
+        'confidence_from': _numbers(diagnosis.features),
         'findings': [_finding_data(f) for f in diagnosis.findings],
         'indistinguishable': [
             {'effects': list(i.effects), 'separated_by': {

@@ -33,6 +33,7 @@ def line_of(answer: Json, outcome: Json) -> dict[str, Any]:
         'true': [{**{key: item.get(key) for key in keys},
                   'subsystem': item['location']['subsystem']} for item in answer['answers']],
         'verdict': diagnosis.get('verdict', ''), 'confidence': diagnosis.get('confidence'),
+        'features': diagnosis.get('confidence_from') or {},
         'said': [_finding(item) for item in diagnosis.get('findings', ())],
         'groups': [list(item.get('effects', ()))
                    for item in diagnosis.get('indistinguishable', ())],

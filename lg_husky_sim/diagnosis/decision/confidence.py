@@ -48,8 +48,7 @@ def of_name(features: Features) -> float:
     """Return how likely the first name is right."""
     return _logistic(setting('name_constant')
                      + setting('name_margin') * math.log(max(features.margin, 1e-3))
-                     + setting('name_share') * math.log1p(min(features.share, 10.0))
-                     + setting('name_gain') * math.log(max(features.gain, 1.0)))
+                     + setting('name_share') * math.log1p(min(max(features.share, 0.0), 10.0)))
 
 
 def of_nothing(features: Features) -> float:

@@ -325,6 +325,17 @@ class Evidence:
                 other.measured - observe(simulate(plants[number], other, log), other, log)))
         return list(self.pool.map(one_of, range(len(self.drives))))
 
+    def about(self, point: Point) -> Evidence:
+        """Return this evidence, whitened about the motion of a point."""
+        motions = self.motions(point, True)
+        predicted = [observe(m, d, point.log) for m, d in zip(motions, self.drives, strict=True)]
+        frames = [frame_of(d, plant, m, p, point.log, reach_of(self.noise))
+                  for d, plant, m, p in zip(self.drives, self.plants(point.plant), motions,
+                                            predicted, strict=True)]
+        models = self.deviations(point)
+        return self.with_whiteners([whitener_of(f, m, self.noise) for f, m in zip(
+            frames, models, strict=True)])
+
     def deviations(self, point: Point) -> list[FloatArray]:
         """Return the deviation model of each drive."""
         numbers = point.numbers
@@ -339,11 +350,4 @@ class Evidence:
 def evidence_of(drives: Sequence[Drive], names: Sequence[str], point: Point, noise: Noise,
                 pool: Executor) -> Evidence:
     """Return the evidence of drives under a first guess of the noise."""
-    blank = Evidence(drives, names, noise, (), pool)
-    motions = blank.motions(point, True)
-    predicted = [observe(m, d, point.log) for m, d in zip(motions, drives, strict=True)]
-    frames = [frame_of(d, plant, m, p, point.log, reach_of(noise)) for d, plant, m, p in zip(
-        drives, blank.plants(point.plant), motions, predicted, strict=True)]
-    models = blank.deviations(point)
-    return Evidence(drives, names, noise, [
-        whitener_of(f, m, noise) for f, m in zip(frames, models, strict=True)], pool)
+    return Evidence(drives, names, noise, (), pool).about(point)

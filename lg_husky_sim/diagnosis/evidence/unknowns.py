@@ -76,6 +76,13 @@ def log_unknown(name: str, centre: float, deviation: float, lower: float, upper:
     return Unknown(name, 'log', False, centre, deviation, lower, upper, 0.2 * deviation)
 
 
+def window_unknown(name: str, usual: float) -> Unknown:
+    """Return the length of the window over which a rate is taken as an unknown."""
+    return Unknown(name, 'log', True, math.log(usual), setting('window_spread'),
+                   math.log(setting('shortest_window')), math.log(setting('longest_window')),
+                   setting('effect_step'))
+
+
 def effect_unknown(parameter: EffectParameter, start: float) -> Unknown:
     """Return a number of an effect as an unknown; positive ones on a logarithmic scale."""
     positive = parameter.lower >= 0.0 and parameter.name not in NEUTRAL
@@ -122,6 +129,8 @@ def base_unknowns(parameters: Parameters, drives: Sequence[Drive]) -> tuple[Unkn
     add('command_delay', setting('transport_spread'), late)
     if wheels:
         add('delay_wheels', offset)
+        if any(d.wheel_times.size and not d.counted for d in drives):
+            found.append(window_unknown('wheel_window', setting('wheel_window')))
     if gyro:
         add('delay_imu', offset)
         add('gyro_offset', setting('gyro_offset'))

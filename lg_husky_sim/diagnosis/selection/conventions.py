@@ -25,6 +25,7 @@ from lg_husky_sim.diagnosis.evidence.observation import (
     wheel_lag,
     WheelReading,
 )
+from lg_husky_sim.diagnosis.evidence.unknowns import window_unknown
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -63,12 +64,15 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     best = min(tried, key=lambda one: one.cost, default=fit)
     if best.cost > fit.cost - setting('reading_gain'):
         return fit
-    length = best.point.reading.values.get(window)
-    if length is None:
-        return best
-    tried = [evidence.fit(_read_so(evidence, best, best.point.reading.replacing(
-        {window: factor * length})), best.slopes, rounds=2) for factor in (0.7, 0.85, 1.18, 1.4)]
-    return min([best, *tried], key=lambda one: one.cost)
+    unknown = window_unknown(window, best.point.log.values.get(window, 0.0) or setting(
+        'shortest_window'))
+    if best.point.reading.imu is None or any(u.name == window for u in best.point.unknowns):
+        return evidence.fit(best.point, best.slopes, rounds=3)
+    # The length of a window that was not read before is one more number.
+    wider = replace(best.point, unknowns=(*best.point.unknowns, unknown),
+                    places=np.append(best.point.places, unknown.centre))
+    slopes = [np.hstack([one, np.zeros((one.shape[0], 1))]) for one in best.slopes]
+    return evidence.fit(wider, slopes, rounds=3, renew=[len(wider.unknowns) - 1])
 
 
 def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
@@ -92,8 +96,11 @@ def _read_so(evidence: Evidence, fit: Fit, reading: Reading) -> Point:
         np.zeros(2)])
     spared = {'delay_wheels': wheel_lag(now) - wheel_lag(other),
               'delay_imu': imu_lag(now, period) - imu_lag(other, period)}
-    places = np.array([place + spared.get(u.name, 0.0) if u.kind == 'log' else place
-                       for u, place in zip(fit.point.unknowns, fit.point.places, strict=True)])
+    places = np.array([
+        place if u.kind != 'log' else u.place(reading.values[u.name]) if u.name in (
+            'wheel_window', 'imu_window') and u.name in reading.values
+        else place + spared.get(u.name, 0.0)
+        for u, place in zip(fit.point.unknowns, fit.point.places, strict=True)])
     return replace(fit.point, reading=reading).at(places)
 
 

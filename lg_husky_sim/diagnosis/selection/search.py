@@ -15,7 +15,8 @@ import math
 
 from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
-from lg_husky_sim.diagnosis.evidence.unknowns import loosened
+from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import loosened, start_of
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     hypotheses,
     Hypothesis,
@@ -323,6 +324,15 @@ def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]
     return evidence, evidence.fit(with_jitter(chosen.point, evidence))
 
 
+def _nominal(point: Point) -> Point:
+    # The robot as it should be, read like a point.
+    centres = start_of(point.unknowns)
+    for place, unknown in enumerate(point.unknowns):
+        if unknown.kind == 'log':
+            centres[place] = point.places[place]
+    return point.at(centres)
+
+
 def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     """
     Find what a model lacks.
@@ -341,9 +351,13 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     Search
     """
     progress('recalibration', 0.05)
-    evidence, base = calibrated(evidence, start)
+    # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
+    start = best_reading(evidence, evidence.fit(start, rounds=1)).point
+    start = _nominal(start)
+    evidence, base = calibrated(evidence.about(start), start)
     evidence, base, postponed = _as_logged(evidence, base)
-    start = with_jitter(replace(start, reading=base.point.reading), evidence)
+    usual = Reading()
+    start = _nominal(base.point)
     plain, rounds, found = base, [], []
     least = 0.0
     while len(rounds) < int(setting('most_effects')):
@@ -360,7 +374,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
                 # The log was made otherwise, or else nothing says so: look again.
                 postponed = False
                 evidence, base = _read_as(evidence, one.base, chosen)
-                start = with_jitter(replace(start, reading=base.point.reading), evidence)
+                start = _nominal(base.point)
                 continue
         rounds.append(one)
         if number == 0:
@@ -371,7 +385,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         found.append(best.hypothesis)
         least = setting('least_part') * rounds[0].tried[0].gain
         evidence, base = calibrated(evidence, best.fit.point, 1)
-        if postponed:
+        if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
             postponed = False
     return Search(plain, base, evidence, tuple(rounds), tuple(found))

@@ -1,0 +1,86 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Coefficients of the confidence, from the outcomes of trials.
+
+For each verdict the share right is a logistic function of what informs about it,
+``p = 1 / (1 + exp(-(c0 + c1 x1 + c2 x2)))``. The coefficients maximise the likelihood of the
+outcomes with independent Gaussian priors around zero, and around a stated share right for c0, so
+that few outcomes do not make certainty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from typing import Any
+
+from lg_husky_sim.proof.scoring import judge
+from lg_husky_sim.proof.settings import settings
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+from scipy.optimize import minimize
+
+Json = Mapping[str, Any]
+
+#: Verdict to the names of its coefficients in the settings of the diagnosis.
+COEFFICIENTS = {
+    'known': ('name_constant', 'name_margin', 'name_share'),
+    'nothing_missing': ('nothing_constant', 'nothing_chance'),
+    'unknown': ('unknown_constant', 'unknown_share_slope'),
+}
+
+
+def _row(verdict: str, features: Json) -> list[float]:
+    """Return what multiplies the coefficients of a verdict."""
+    margin, share = float(features['margin']), float(features['share'])
+    if verdict == 'known':
+        return [1.0, math.log(max(margin, 1e-3)), math.log1p(min(max(share, 0.0), 10.0))]
+    if verdict == 'nothing_missing':
+        return [1.0, math.log10(max(float(features['chance']), 1e-12))]
+    return [1.0, math.log(max(share, 1e-3))]
+
+
+def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
+    """
+    Fit the coefficients of the confidence.
+
+    Parameters
+    ----------
+    lines : sequence of mapping
+        Outcomes with the features of their confidence.
+
+    Returns
+    -------
+    dict
+        Coefficient to its value, the number of outcomes, and how many of them were right.
+    """
+    rows: dict[str, list[list[float]]] = {name: [] for name in COEFFICIENTS}
+    right: dict[str, list[float]] = {name: [] for name in COEFFICIENTS}
+    for line in lines:
+        mark = judge(line).right
+        if line.get('features') and line['verdict'] in rows and mark is not None:
+            rows[line['verdict']].append(_row(line['verdict'], line['features']))
+            right[line['verdict']].append(mark)
+    found = {}
+    for verdict, names in COEFFICIENTS.items():
+        x = np.array(rows[verdict]).reshape(-1, len(names))
+        y = np.array(right[verdict])
+        for name, value in zip(names, _fit(x, y), strict=True):
+            found[name] = (value, y.size, int(np.sum(y)))
+    return found
+
+
+def _fit(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the most probable coefficients."""
+    centre = np.zeros(x.shape[1])
+    prior = settings()['calibration']
+    share = float(prior['right']['value'])
+    centre[0] = math.log(share / (1.0 - share))
+
+    def cost(c: FloatArray) -> float:
+        z = x @ c
+        return float(np.sum(np.logaddexp(0.0, z) - y * z)
+                     + 0.5 * np.sum(((c - centre) / float(prior['spread']['value'])) ** 2))
+    found: FloatArray = minimize(cost, centre, method='BFGS').x
+    return found
