@@ -6,6 +6,10 @@ When a gain is beyond chance.
 Twice the gain of a hypothesis with k numbers is nearly chi-square distributed with k degrees of
 freedom on a robot that lacks nothing; with n hypotheses tried, the largest of them exceeds a gain
 with a probability of at most n times that of one.
+
+Innovations that are not quite white make a gain larger by chance: by the ratio of the variance of
+its score ``c' e``, estimated from blocks of time that are independent of each other (sandwich), to
+the variance ``c' c`` of white ones.
 """
 
 from __future__ import annotations
@@ -13,10 +17,49 @@ from __future__ import annotations
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray
+import numpy as np
 from scipy.stats import chi2
 
 
-def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidence) -> float:
+def dispersion(evidence: Evidence, whitened: FloatArray, columns: FloatArray) -> float:
+    """
+    Return by how much twice a gain exceeds chi-square on the mean.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    whitened : numpy.ndarray, shape (n,)
+        Innovations of all drives, in the order of time.
+    columns : numpy.ndarray, shape (n, k)
+        Whitened derivatives by the numbers of the hypothesis.
+
+    Returns
+    -------
+    float
+        At least what Student's t makes of white innovations.
+    """
+    nu = setting('student')
+    scores = columns * (whitened * (nu + 1.0) / (nu + whitened ** 2))[:, None]
+    meat = np.zeros((columns.shape[1], columns.shape[1]))
+    place = 0
+    for whitener in evidence.whiteners:
+        frame = whitener.frame
+        times = frame.times[frame.order]
+        part = scores[place:place + times.size]
+        place += times.size
+        block = ((times - times[0]) / setting('block')).astype(np.int64)
+        starts = np.flatnonzero(np.diff(block, prepend=-1))
+        sums = np.add.reduceat(part, starts, axis=0)
+        meat += sums.T @ sums
+    scale = np.sqrt(np.maximum(np.sum(columns ** 2, axis=0), 1e-300))
+    bread = columns.T @ columns / np.outer(scale, scale)
+    ratio = np.trace(np.linalg.pinv(bread, rcond=1e-9) @ (meat / np.outer(scale, scale)))
+    return max(setting('inflation'), float(ratio) / columns.shape[1])
+
+
+def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidence,
+              inflation: float) -> float:
     """
     Return how likely the largest gain is on a robot that lacks nothing.
 
@@ -29,6 +72,8 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
         Number of hypotheses and starts.
     evidence : Evidence
         Its length says how many onsets were tried.
+    inflation : float
+        Of twice the gain, see :func:`dispersion`.
 
     Returns
     -------
@@ -39,7 +84,7 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
     if hypothesis.onset is not None:
         seconds = sum(d.end - d.start for d in evidence.drives)
         count *= max(1.0, seconds / setting('onset_resolution'))
-    tail = float(chi2.sf(2.0 * max(gain, 0.0) / setting('inflation'), hypothesis.size))
+    tail = float(chi2.sf(2.0 * max(gain, 0.0) / inflation, hypothesis.size))
     return min(1.0, count * tail)
 
 

@@ -76,10 +76,10 @@ def log_unknown(name: str, centre: float, deviation: float, lower: float, upper:
     return Unknown(name, 'log', False, centre, deviation, lower, upper, 0.2 * deviation)
 
 
-def window_unknown(name: str, usual: float) -> Unknown:
+def window_unknown(name: str, usual: float, longest: float) -> Unknown:
     """Return the length of the window over which a rate is taken as an unknown."""
     return Unknown(name, 'log', True, math.log(usual), setting('window_spread'),
-                   math.log(setting('shortest_window')), math.log(setting('longest_window')),
+                   math.log(setting('shortest_window')), math.log(longest),
                    setting('effect_step'))
 
 
@@ -130,7 +130,8 @@ def base_unknowns(parameters: Parameters, drives: Sequence[Drive]) -> tuple[Unkn
     if wheels:
         add('delay_wheels', offset)
         if any(d.wheel_times.size and not d.counted for d in drives):
-            found.append(window_unknown('wheel_window', setting('wheel_window')))
+            found.append(window_unknown('wheel_window', setting('wheel_window'),
+                                        setting('longest_window')))
     if gyro:
         add('delay_imu', offset)
         add('gyro_offset', setting('gyro_offset'))

@@ -62,10 +62,12 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
     tried = [evidence.fit(points[place], fit.slopes, rounds=2) for place in order]
     best = min(tried, key=lambda one: one.cost, default=fit)
-    if best.cost > fit.cost - setting('reading_gain'):
+    # What the same reading gains by as many steps is not due to another one.
+    same = evidence.fit(fit.point, fit.slopes, rounds=2)
+    if best.cost > min(fit.cost, same.cost) - setting('reading_gain'):
         return fit
     unknown = window_unknown(window, best.point.log.values.get(window, 0.0) or setting(
-        'shortest_window'))
+        'shortest_window'), setting('longest_imu_window'))
     if best.point.reading.imu is None or any(u.name == window for u in best.point.unknowns):
         return evidence.fit(best.point, best.slopes, rounds=3)
     # The length of a window that was not read before is one more number.

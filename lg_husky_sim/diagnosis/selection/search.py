@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 import math
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, dispersion, is_beyond_chance
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened, start_of
@@ -217,14 +217,15 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         return Round(evidence, base, (), False, 1.0, tuple(seen))
     tried = _fitted(evidence, base, seen[:few], [base.point], whole=False)
     starts = sum(len(h.trials()) for h in pool)
-    chance = chance_of(tried[0].gain, tried[0].hypothesis, starts, evidence) if tried else 1.0
+    chance = _chance(evidence, tried[0], starts) if tried else 1.0
     if chance > setting('hopeless') or tried[0].gain < 0.5 * least:
         return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     for _ in range(2):
         best = tried[0]
         evidence = evidence.renoised(best.fit)
         points = [base.point] + ([nominal] if nominal is not None else [])
-        base = min((evidence.fit(p, base.slopes) for p in points), key=lambda f: f.cost)
+        base = min((evidence.fit(with_jitter(p, evidence), base.slopes) for p in points),
+                   key=lambda f: f.cost)
         seen = _looks(evidence, base, pool, [t.hypothesis.effect for t in tried])
         chosen = list(seen[:few])
         known = {one.hypothesis.label for one in chosen}
@@ -236,9 +237,14 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
             break
     tried.sort(key=lambda t: (is_negligible(t), -t.score))
     best = tried[0]
-    chance = 1.0 if is_negligible(best) else chance_of(
-        best.gain, best.hypothesis, starts, evidence)
+    chance = 1.0 if is_negligible(best) else _chance(evidence, best, starts)
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
+
+
+def _chance(evidence: Evidence, tried: Tried, starts: int) -> float:
+    own = tried.fit.jacobian[:, -len(tried.hypothesis.free):]
+    return chance_of(tried.gain, tried.hypothesis, starts, evidence,
+                     dispersion(evidence, tried.fit.whitened, own))
 
 
 def is_negligible(tried: Tried) -> bool:
@@ -304,17 +310,17 @@ def _fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequen
     return list(once.values())
 
 
-def _as_logged(evidence: Evidence, base: Fit) -> tuple[Evidence, Fit, bool]:
+def _as_logged(evidence: Evidence, base: Fit) -> tuple[Fit, bool]:
     # A missing effect can pass for another reading of the sensors. Where an effect promises more
     # than the reading gains, the reading waits for what the effect really gains.
     chosen = best_reading(evidence, base)
     if chosen is base:
-        return evidence, base, False
+        return base, False
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
-    seen = look(evidence, base, pool)
-    if seen and seen[0].gain > base.cost - chosen.cost:
-        return evidence, base, True
-    return (*_read_as(evidence, base, chosen), False)
+    seen = look(evidence, base, pool)[:int(setting('readings_fitted'))]
+    gains = [t.gain for t in _fitted(evidence, base, seen, [base.point], whole=False)]
+    waits = max(gains, default=0.0) > (1.0 + setting('near_margin')) * (base.cost - chosen.cost)
+    return (base if waits else chosen), waits
 
 
 def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]:
@@ -352,10 +358,10 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     """
     progress('recalibration', 0.05)
     # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
-    start = best_reading(evidence, evidence.fit(start, rounds=1)).point
-    start = _nominal(start)
+    start = _nominal(_as_logged(evidence, evidence.fit(start, rounds=1))[0].point)
     evidence, base = calibrated(evidence.about(start), start)
-    evidence, base, postponed = _as_logged(evidence, base)
+    chosen, postponed = _as_logged(evidence, base)
+    evidence, base = _read_as(evidence, base, chosen)
     usual = Reading()
     start = _nominal(base.point)
     plain, rounds, found = base, [], []
