@@ -63,9 +63,9 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     tried = [evidence.fit(points[place], fit.slopes, rounds=2) for place in order]
     best = min(tried, key=lambda one: one.cost, default=fit)
     # What the same reading gains by as many steps is not due to another one.
-    same = evidence.fit(fit.point, fit.slopes, rounds=2)
-    if best.cost > min(fit.cost, same.cost) - setting('reading_gain'):
-        return fit
+    same = min(fit, evidence.fit(fit.point, rounds=3), key=lambda one: one.cost)
+    if best.cost > same.cost - setting('reading_gain'):
+        return fit if same.cost > fit.cost - setting('reading_gain') else same
     unknown = window_unknown(window, best.point.log.values.get(window, 0.0) or setting(
         'shortest_window'), setting('longest_imu_window'))
     if best.point.reading.imu is None or any(u.name == window for u in best.point.unknowns):

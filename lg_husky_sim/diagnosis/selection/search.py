@@ -24,6 +24,7 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     Numbers,
 )
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
+from lg_husky_sim.diagnosis.selection.elimination import eliminated
 from lg_husky_sim.diagnosis.selection.onsets import onset_looks, refined
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.settings import setting
@@ -236,9 +237,23 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     tried.sort(key=lambda t: (is_negligible(t), -t.score))
+    tried = _from_the_start(evidence, base, tried)
     best = tried[0]
     chance = 1.0 if is_negligible(best) else _chance(evidence, best, starts)
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
+
+
+def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[Tried]:
+    # An onset is for those that do not do as well without it, beginning from what it found.
+    best = tried[0]
+    if best.hypothesis.onset is None or best.hypothesis.effect.kind.needs_onset:
+        return tried
+    places = best.fit.point.places[:base.point.places.size]
+    again = attempt(evidence, base, best.hypothesis.at(None),
+                    [(base.point.at(places), _numbers(best))])
+    if again is None or again.score < best.score:
+        return tried
+    return [again, *(t for t in tried[1:] if t.hypothesis.effect != again.hypothesis.effect)]
 
 
 def _chance(evidence: Evidence, tried: Tried, starts: int) -> float:
@@ -394,4 +409,9 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
             postponed = False
+    if len(found) > 1:
+        base, kept = eliminated(evidence, plain.point, base, found, least)
+        rounds = [r for r, h in zip(rounds, found, strict=False) if h in kept] + rounds[
+            len(found):]
+        found = kept
     return Search(plain, base, evidence, tuple(rounds), tuple(found))

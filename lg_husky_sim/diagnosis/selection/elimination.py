@@ -1,0 +1,71 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Backward elimination: what was adopted first may not be needed beside what came after it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, dispersion, is_beyond_chance
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
+from lg_husky_sim.errors import LgHuskyError
+import numpy as np
+
+
+def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hypothesis],
+               least: float) -> tuple[Fit, list[Hypothesis]]:
+    """
+    Drop adopted effects without which the others explain as much.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    plain : Point
+        The model without effects.
+    final : Fit
+        With all of them.
+    found : sequence of Hypothesis
+        In the order of adoption.
+    least : float
+        What an effect has to gain [nats].
+
+    Returns
+    -------
+    Fit
+        With those that are kept.
+    list of Hypothesis
+    """
+    kept = list(found)
+    while len(kept) > 1:
+        tried = []
+        for one in kept:
+            try:
+                fit = evidence.fit(_with(plain, final.point, [h for h in kept if h is not one]))
+            except LgHuskyError:
+                # The others do not go without it.
+                continue
+            tried.append((fit.cost - final.cost, fit, one))
+        if not tried:
+            break
+        loss, fit, one = min(tried, key=lambda t: t[0])
+        own = [place for place, unknown in enumerate(final.point.unknowns)
+               if unknown.name in {p.name for p in one.free}]
+        chance = chance_of(loss, one, 1, evidence, dispersion(
+            evidence, final.whitened, final.jacobian[:, own]))
+        if loss >= least and is_beyond_chance(chance):
+            break
+        final = fit
+        kept = [h for h in kept if h is not one]
+    return final, kept
+
+
+def _with(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Point:
+    """Return the final point with some of its effects only."""
+    base = [place for place, unknown in enumerate(final.unknowns) if unknown.kind != 'effect']
+    point = replace(plain, reading=final.reading, places=np.array(final.places[base]),
+                    unknowns=tuple(final.unknowns[place] for place in base))
+    for one in kept:
+        point = one.point(point, {p.name: final.values[p.name] for p in one.free})
+    return point
