@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 import itertools
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, dispersion, is_beyond_chance
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Point
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -38,7 +38,7 @@ def setup(drive: Callable[..., Recording]) -> Iterator[tuple[Evidence, Point]]:
 
 
 def test_larger_gains_are_less_likely_by_chance(setup: tuple[Evidence, Point]) -> None:
-    chances = [chance_of(gain, ALL[0], 60, setup[0]) for gain in np.linspace(-5.0, 60.0, 40)]
+    chances = [chance_of(gain, ALL[0], 60, setup[0], 1.06) for gain in np.linspace(-5.0, 60.0, 40)]
     assert chances[0] == 1.0
     assert all(b <= a for a, b in itertools.pairwise(chances))
     assert not is_beyond_chance(chances[0])
@@ -49,8 +49,21 @@ def test_more_tries_and_an_onset_make_a_gain_likelier_by_chance(
         setup: tuple[Evidence, Point]) -> None:
     evidence, one = setup[0], ALL[0]
     late = one.at(Onset(OnsetKind.TIME, 8.0, 'ahead'))
-    few, many = chance_of(15.0, one, 10, evidence), chance_of(15.0, one, 100, evidence)
-    assert few < many < chance_of(15.0, late, 100, evidence) < 1.0
+    few, many = (chance_of(15.0, one, tried, evidence, 1.06) for tried in (10, 100))
+    assert few < many < chance_of(15.0, late, 100, evidence, 1.06) < 1.0
+    assert many < chance_of(15.0, one, 100, evidence, 2.0)
+
+
+def test_noise_that_is_correlated_makes_gains_larger_by_chance(
+        setup: tuple[Evidence, Point]) -> None:
+    evidence, rng = setup[0], np.random.default_rng(5)
+    columns = np.cos(np.linspace(0.0, 40.0, evidence.count))[:, None]
+    white = [dispersion(evidence, rng.standard_normal(evidence.count), columns)
+             for _ in range(20)]
+    slow = [dispersion(evidence, np.repeat(rng.standard_normal(
+        evidence.count // 100 + 1), 100)[:evidence.count], columns) for _ in range(20)]
+    assert np.mean(white) < 1.5
+    assert np.mean(slow) > 5.0
 
 
 @pytest.mark.parametrize('taken', ['slope', 'gyro_scale', 'command_slew', 'coulomb_drivetrain'])

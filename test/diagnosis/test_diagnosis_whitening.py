@@ -30,7 +30,7 @@ TRUE = Noise({
     'force': 6.0, 'moment': 1.0, 'drive': 0.4, 'force_time': 0.3, 'moment_time': 0.3,
     'drive_time': 0.08, 'place_walk': 1e-4, 'heading_walk': 1e-4, 'wheel': 0.02,
     'wheel_jitter': 5e-4, 'gyro': 0.005, 'imu_jitter': 5e-4, 'place': 0.003, 'heading': 0.003,
-    'pose_jitter': 5e-4})
+    'pose_jitter': 5e-4, 'command_jitter': 1e-3})
 
 
 @pytest.fixture(scope='module')
@@ -87,7 +87,7 @@ def simulated(whitener: Whitener, noise: Noise, count: int, seed: int) -> FloatA
 
 def known(whitener: Whitener) -> Whitener:
     """Return the filter with the true noise, without commands that may be lost."""
-    return whitener_of(replace(whitener.frame, kicks=np.zeros((0, 3))), whitener.model, TRUE)
+    return whitener_of(replace(whitener.frame, kicks=np.zeros((0, 6))), whitener.model, TRUE)
 
 
 def test_innovations_of_the_deviation_model_are_white_with_unit_variance(

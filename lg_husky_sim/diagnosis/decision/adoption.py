@@ -55,7 +55,8 @@ def dispersion(evidence: Evidence, whitened: FloatArray, columns: FloatArray) ->
     scale = np.sqrt(np.maximum(np.sum(columns ** 2, axis=0), 1e-300))
     bread = columns.T @ columns / np.outer(scale, scale)
     ratio = np.trace(np.linalg.pinv(bread, rcond=1e-9) @ (meat / np.outer(scale, scale)))
-    return max(setting('inflation'), float(ratio) / columns.shape[1])
+    found: float = max(setting('inflation'), float(ratio) / columns.shape[1])
+    return found
 
 
 def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidence,

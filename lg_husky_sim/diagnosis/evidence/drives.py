@@ -182,7 +182,7 @@ def _rounding(values: FloatArray) -> FloatArray:
         return np.zeros(values.size)
     quantum = float(np.quantile(steps[moved], setting('least_steps')))
     run = np.concatenate([[0], np.cumsum(moved)])
-    return quantum ** 2 / 12.0 * np.bincount(run)[run]
+    return np.asarray(quantum ** 2 / 12.0 * np.bincount(run)[run], dtype=np.float64)
 
 
 def _early(series: TimeSeries, start: float, names: Sequence[str]) -> list[float]:

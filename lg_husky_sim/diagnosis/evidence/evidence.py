@@ -23,9 +23,9 @@ from lg_husky_sim.diagnosis.evidence.deviation import slow_model
 from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.frames import frame_of
 from lg_husky_sim.diagnosis.evidence.noise import (
-    reach_of,
     fit_noise,
     Noise,
+    reach_of,
     Whitener,
     whitener_of,
 )

@@ -4,7 +4,9 @@
 Noise: what nobody can predict, at the balances of the graph and in the sensors.
 
 The variance of a sensor's reading is ``sigma^2 + q^2 / 12 + sigma_t^2 (dy/dt)^2``: one that is
-rounded to q is off by q/sqrt(12), by the same when it repeats, and a stamp that is off by sigma_t leaves an error of that slope. Intensities are found by maximum likelihood.
+rounded to q is off by q/sqrt(12), by the same when it repeats, and a stamp that is off by sigma_t
+leaves an error of that slope. A command that comes by s later than it should leaves a step of the
+speeds of s times what its voltages accelerate. Intensities are found by maximum likelihood.
 """
 
 from __future__ import annotations
@@ -73,7 +75,8 @@ def sensor_variance(frame: Frame, noise: Noise) -> FloatArray:
     out = np.empty(frame.times.size)
     for channel, (level, jitter) in size.items():
         part = frame.drive.slice_of(channel)
-        out[part] = (frame.drive.rounding[part] + values[level] ** 2 + (values[jitter] * frame.slopes[part]) ** 2)
+        out[part] = (frame.drive.rounding[part] + values[level] ** 2
+                     + (values[jitter] * frame.slopes[part]) ** 2)
     return out
 
 

@@ -100,7 +100,7 @@ def _others(drive: Drive, stamp: float, score: Score) -> Iterator[tuple[Drive, F
     usual = float(np.median(gaps))
     if place < gaps.size and setting('lost_gap') * usual < gaps[place] < (
             setting('pause') * usual):
-        yield _filled(drive, place, int(round(gaps[place] / usual)) - 1, score)
+        yield _filled(drive, place, round(float(gaps[place]) / usual) - 1, score)
 
 
 def _filled(drive: Drive, place: int, count: int, score: Score) -> tuple[Drive, FloatArray]:

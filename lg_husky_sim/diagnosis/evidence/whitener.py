@@ -175,11 +175,17 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
         unsure = noise[reading]
         near = kick
         while near < kicks.shape[0] and kicks[near, 0] - kicks[near, 5] <= now:
+            # Of times that are evenly spread over the reach, what one of them has done by now
+            # has 4 r^3 - 3 r^4 of the variance that it leaves at the end, r of the reach over.
+            over = 0.0
+            if kicks[near, 5] > 0.0:
+                over = (now - kicks[near, 0] + kicks[near, 5]) / (2.0 * kicks[near, 5])
+            spread = 4.0 * over ** 3 - 3.0 * over ** 4
             for i in range(4):
                 if channel == of_late[i]:
                     step = process[9] * (model[20 + 2 * i] * kicks[near, 3]
                                          + model[21 + 2 * i] * kicks[near, 4])
-                    unsure += step * step
+                    unsure += spread * step * step
             near += 1
         variance = _read(column, 0, channel, model) + unsure
         for i in range(12):

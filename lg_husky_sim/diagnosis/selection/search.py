@@ -379,7 +379,9 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     evidence, base = _read_as(evidence, base, chosen)
     usual = Reading()
     start = _nominal(base.point)
-    plain, rounds, found = base, [], []
+    plain = base
+    rounds: list[Round] = []
+    found: list[Hypothesis] = []
     least = 0.0
     while len(rounds) < int(setting('most_effects')):
         number = len(rounds)
