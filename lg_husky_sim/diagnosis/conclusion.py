@@ -13,7 +13,8 @@ from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort
 from lg_husky_sim.diagnosis.localisation import where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
-from lg_husky_sim.diagnosis.selection.search import Round, Search, Tried
+from lg_husky_sim.diagnosis.selection.rounds import Round, Tried
+from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import sentence

@@ -18,6 +18,7 @@ import math
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drive_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, evidence_of
+from lg_husky_sim.diagnosis.evidence.noise import NAMES as LEVELS
 from lg_husky_sim.diagnosis.evidence.noise import Noise
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, effect_unknowns
@@ -31,11 +32,6 @@ from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Segment
 import numpy as np
-
-#: Intensities of the noise that a drive is judged with, by the names of the settings.
-LEVELS = ('force', 'moment', 'drive', 'force_time', 'moment_time', 'drive_time', 'place_walk',
-          'heading_walk', 'wheel', 'wheel_jitter', 'gyro', 'imu_jitter', 'place', 'heading',
-          'pose_jitter')
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,13 @@ from typing import Any
 
 from lg_husky_sim.proof.scoring import judge
 from lg_husky_sim.proof.settings import settings
-from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 Json = Mapping[str, Any]
+
+FloatArray = NDArray[np.float64]
 
 #: Verdict to the names of its coefficients in the settings of the diagnosis.
 COEFFICIENTS = {

@@ -13,7 +13,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, eviden
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
-from lg_husky_sim.diagnosis.selection.search import calibrated
+from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording, segments

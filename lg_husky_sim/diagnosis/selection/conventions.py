@@ -30,9 +30,6 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Where in the window of its mean a low-passed yaw rate is stamped.
-LOW_PASS = 0.5 - 1.0 / math.sqrt(12.0)
-
 
 def best_reading(evidence: Evidence, fit: Fit) -> Fit:
     """
@@ -131,4 +128,4 @@ def _imu_options(evidence: Evidence, now: Reading) -> list[Reading]:
         return []
     return [replace(now, imu=place).replacing({'imu_window': window})
             for window in (0.01, 0.04, round(_period(times), 4))
-            for place in (0.0, 0.5, 1.0, LOW_PASS)]
+            for place in (0.0, 0.5, 1.0, 0.5 - 1.0 / math.sqrt(12.0))]
