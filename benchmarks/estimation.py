@@ -33,6 +33,7 @@ from lg_husky_sim.simulation import rollout, Simulator
 from lg_husky_sim.simulation.simulator import hold
 import numba
 import numpy as np
+import scipy.linalg
 
 #: Multiplications and additions of one step of one candidate in the batch kernel.
 OPERATIONS = 8 * 7 + 12 + 2 * 20 + 18
@@ -79,9 +80,12 @@ def numpy_steps(model: HuskyModel, nominal: ModelFile, part: Segment, count: int
     objective = TrackingObjective(model, nominal.parameters, free_names(nominal, ()), [part])
     track = objective.tracks[0]
     plant = model.at(nominal.parameters).sets[0]
-    phi = Simulator(model.at(nominal.parameters), PERIOD).operators.arguments
-    a, b = np.array(phi[4])[0].T, np.array(phi[5])[0].T
-    stage = plant.command
+    n, stage = plant.a.shape[0], plant.command
+    block = np.zeros((n + 6, n + 6))
+    block[:n, :n], block[:n, n + 4:] = plant.a, plant.b
+    block[n:n + 4, :n] = plant.rows[:4]
+    step = scipy.linalg.expm(block * PERIOD)[:n + 4]
+    a, b = step[:, :n + 4], step[:, n + 4:]
 
     def once() -> None:
         x, pose = np.zeros(a.shape[0]), np.zeros(3)

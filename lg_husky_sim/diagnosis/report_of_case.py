@@ -256,10 +256,11 @@ def new_terms(model: ModelFile, plain: Structure) -> list[str]:
 
 
 def _short_names(graph: LinearGraph, added: Sequence[str]) -> tuple[LinearGraph, tuple[str, ...]]:
-    # New branches under names that are short enough to be drawn: T_new_L, E_new_1.
+    # New sources under names that are short enough to be drawn: T_new_L, E_new_1. Other new
+    # elements, such as an axle's inertia, keep theirs: laws read their variables by name.
     fresh: list[Branch] = []
     for branch in graph.branches:
-        if branch.name in added:
+        if branch.name in added and branch.characteristic is not None:
             graph = graph.without(branch.name)
             end = branch.name.rsplit('_', 1)[-1]
             short = f'{branch.name[0]}_new' + (f'_{end}' if len(end) <= 2 else '')
@@ -268,7 +269,8 @@ def _short_names(graph: LinearGraph, added: Sequence[str]) -> tuple[LinearGraph,
                 short = next(f'{short}_{n}' for n in range(2, len(taken) + 3)
                              if f'{short}_{n}' not in taken)
             fresh.append(replace(branch, name=short))
-    return graph.with_branches(*fresh), tuple(branch.name for branch in fresh)
+    kept = tuple(name for name in added if name in graph.names)
+    return graph.with_branches(*fresh), (*kept, *(branch.name for branch in fresh))
 
 
 def _graph_figure(plain: Structure, final: Structure, elements: Sequence[str]) -> Figure:
