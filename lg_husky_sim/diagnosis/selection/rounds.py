@@ -154,7 +154,8 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
 
 
 def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
-               nominal: Point | None, least: float = 0.0) -> Round:
+               nominal: Point | None, least: float = 0.0,
+               seeds: Sequence[Tried] = ()) -> Round:
     """
     Look at hypotheses, fit the best of them and compare them under one noise.
 
@@ -168,6 +169,8 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         Another point of the base's structure to begin from: the nominal one.
     least : float
         Gain below which nothing is adopted [nats].
+    seeds : sequence of Tried
+        What was found on another way than from the base.
 
     Returns
     -------
@@ -175,9 +178,10 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     """
     seen = _looks(evidence, base, pool, None if nominal is not None else ())
     few = int(setting('fitted'))
-    if not seen or setting('look_trust') * seen[0].gain < least:
+    if not seeds and (not seen or setting('look_trust') * seen[0].gain < least):
         return Round(evidence, base, (), False, 1.0, tuple(seen))
     tried = fitted(evidence, base, seen[:few], [base.point], whole=False)
+    tried = sorted([*tried, *seeds], key=lambda t: -t.score)
     starts = sum(len(h.trials()) for h in pool)
     chance = _chance(evidence, tried[0], starts) if tried else 1.0
     if chance > setting('hopeless') or tried[0].gain < 0.5 * least:

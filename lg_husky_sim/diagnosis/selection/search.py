@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
 from lg_husky_sim.diagnosis.evidence.observation import Reading
@@ -18,10 +18,12 @@ from lg_husky_sim.diagnosis.selection.rounds import (
     fitted,
     play_round,
     Round,
+    Tried,
     with_jitter,
 )
 from lg_husky_sim.diagnosis.selection.screening import look
 from lg_husky_sim.diagnosis.settings import setting
+import numpy as np
 
 Progress = Callable[[str, float], None]
 
@@ -55,17 +57,19 @@ class Search:
         return self.rounds[:len(self.found)]
 
 
-def _as_logged(evidence: Evidence, base: Fit) -> tuple[Fit, bool]:
+def _as_logged(evidence: Evidence, base: Fit) -> tuple[Fit, list[Tried]]:
     # A missing effect can pass for another reading of the sensors. Where an effect promises more
-    # than the reading gains, the reading waits for what the effect really gains.
+    # than the reading gains, the reading waits for what the effect really gains; those that do are
+    # returned, best first.
     chosen = best_reading(evidence, base)
     if chosen is base:
-        return base, False
+        return base, []
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
     seen = look(evidence, base, pool)[:int(setting('readings_fitted'))]
-    gains = [t.gain for t in fitted(evidence, base, seen, [base.point], whole=False)]
-    waits = max(gains, default=0.0) > (1.0 + setting('near_margin')) * (base.cost - chosen.cost)
-    return (base if waits else chosen), waits
+    promised = (1.0 + setting('near_margin')) * (base.cost - chosen.cost)
+    better = [t for t in fitted(evidence, base, seen, [base.point], whole=False)
+              if t.gain > promised]
+    return (base if better else chosen), better
 
 
 def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]:
@@ -73,6 +77,22 @@ def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]
         return evidence, base
     evidence = evidence.renoised(chosen)
     return evidence, evidence.fit(with_jitter(chosen.point, evidence))
+
+
+def _seeds(evidence: Evidence, rough: Point, base: Fit, early: Sequence[Tried]) -> list[Tried]:
+    # Where the numbers of the robot, and the noise, have taken an effect's place, what the effect
+    # gains with numbers and noise of its own.
+    names = [u.name for u in rough.unknowns]
+    if (not early or 0.5 * float(np.sum(base.point.strain ** 2)) < setting('distorted')
+            or names != [u.name for u in base.point.unknowns]):
+        return []
+    best = early[0]
+    there = replace(rough, places=best.fit.point.places[:len(names)])
+    begins = [best.fit.point, *(best.hypothesis.point(there, start)
+                                for start in best.hypothesis.starts)]
+    costs = [evidence.cost(evidence.residuals(evidence.predict(p)), p) for p in begins]
+    own, fit = calibrated(evidence, begins[int(np.argmin(costs))], 1)
+    return [Tried(best.hypothesis, fit, own.fit(base.point).cost - fit.cost, own.count)]
 
 
 def _nominal(point: Point) -> Point:
@@ -103,10 +123,14 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     """
     progress('recalibration', 0.05)
     # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
-    start = _nominal(_as_logged(evidence, evidence.fit(start, rounds=1))[0].point)
+    first, rough = evidence, evidence.fit(start, rounds=1)
+    chosen, early = _as_logged(evidence, rough)
+    start = _nominal(chosen.point)
     evidence, base = calibrated(evidence.about(start), start)
-    chosen, postponed = _as_logged(evidence, base)
+    chosen, better = _as_logged(evidence, base)
+    postponed = bool(better)
     evidence, base = _read_as(evidence, base, chosen)
+    seeds = _seeds(first, rough.point, base, early)
     usual = Reading()
     start = _nominal(base.point)
     plain = base
@@ -117,7 +141,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         number = len(rounds)
         progress(f'looking for effect {number + 1}', 0.1 + 0.25 * number)
         one = play_round(evidence, base, hypotheses(base.point.structure),
-                         None if found else start, least)
+                         None if found else start, least, seeds)
+        seeds = []
         best = one.tried[0] if one.tried else None
         evidence = one.evidence
         adopted = best is not None and one.adopted and best.gain >= least
