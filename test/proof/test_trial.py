@@ -85,8 +85,11 @@ def test_what_was_interrupted_has_no_outcome(
     """Ctrl-C reaches the diagnoses too; the next run asks them again."""
     folders = trial.Folders(prepared.root / f'stopped{code}', prepared.root)
     monkeypatch.setattr(trial, 'command_for', lambda *_: [
-        sys.executable, '-c', 'import os, sys; code = int(sys.argv[1])\n'
-        'os.kill(os.getpid(), -code) if code < 0 else sys.exit(code)', str(code)])
+        sys.executable, '-c', 'import os, signal, sys; code = int(sys.argv[1])\n'
+        # A shell in the background ignores SIGINT, and so do its children.
+        'if code >= 0: sys.exit(code)\n'
+        'signal.signal(-code, signal.SIG_DFL)\n'
+        'os.kill(os.getpid(), -code)', str(code)])
     with pytest.raises(CommandError, match='interrupted'):
         list(trial.diagnose_all(folders, ['case_0001'], 1))
     assert not (folders.runs / 'case_0001' / 'outcome.json').exists()
