@@ -220,28 +220,3 @@ def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatA
         else:
             out[j] = _source_law(law, p0, p1, p2, z, o, memory, context[0], context[6],
                                  coefficients[c, j, CEILING])
-
-
-@jit_part
-def remember(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatArray,
-             z: FloatArray, memory: FloatArray, step: float) -> None:
-    """
-    Advance the memories (motor heat, gear play) by ``step`` [s].
-
-    Parameters
-    ----------
-    c, laws, coefficients, offsets, z, memory
-        As in :func:`evaluate`; ``memory`` is changed.
-    step : float
-        Time [s].
-    """
-    for j in range(laws.shape[1]):
-        o = offsets[c, j]
-        if laws[c, j] == 13:
-            side = int(coefficients[c, j, 2])
-            memory[side] += step * (z[o] * z[o] - memory[side] / coefficients[c, j, 1])
-        elif laws[c, j] == 14:
-            side = 2 + int(coefficients[c, j, 2])
-            half = 0.5 * coefficients[c, j, 0]
-            memory[side] = _clip(
-                memory[side] + step * (z[o] / coefficients[c, j, 1] - z[o + 1]), -half, half)

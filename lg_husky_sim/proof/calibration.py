@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 import math
 from typing import Any
 
+from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.proof.scoring import judge
 from lg_husky_sim.proof.settings import settings
 import numpy as np
@@ -56,14 +57,27 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
     -------
     dict
         Coefficient to its value, the number of outcomes, and how many of them were right.
+
+    Raises
+    ------
+    LgHuskyError
+        If features are damaged, or no outcome has any.
     """
     rows: dict[str, list[list[float]]] = {name: [] for name in COEFFICIENTS}
     right: dict[str, list[float]] = {name: [] for name in COEFFICIENTS}
     for line in lines:
         mark = judge(line).right
         if line.get('features') and line['verdict'] in rows and mark is not None:
-            rows[line['verdict']].append(_row(line['verdict'], line['features']))
+            try:
+                row = _row(line['verdict'], line['features'])
+            except (KeyError, TypeError, ValueError) as error:
+                raise LgHuskyError(f'case {line["case"]}: the features of its confidence need the '
+                                   f'numbers margin, share and chance: {error}') from error
+            rows[line['verdict']].append(row)
             right[line['verdict']].append(mark)
+    if not any(right.values()):
+        raise LgHuskyError('no outcome has the features of its confidence: they are of an '
+                           'earlier version, or all of before and after')
     found = {}
     for verdict, names in COEFFICIENTS.items():
         x = np.array(rows[verdict]).reshape(-1, len(names))

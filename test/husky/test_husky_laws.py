@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from lg_husky_sim.husky.laws import CONTEXT, evaluate, EXPRESSIONS, Law, MEMORY, remember, WIDTH
+from lg_husky_sim.husky.laws import CONTEXT, evaluate, EXPRESSIONS, Law, MEMORY, WIDTH
 from lg_husky_sim.linear_graph.expressions import compile_tuple, GLOBALS
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -147,41 +147,3 @@ def test_periodic_tables_come_round() -> None:
         context[1] = heading
         expected = np.interp(heading % (2.0 * math.pi), edges, np.append(heights, heights[0]))
         assert opcode(Law.TABLE, row, np.zeros(1), context) == pytest.approx(expected, abs=1e-10)
-
-
-def advanced(law: int, coefficients: list[float], z: list[float], memory: FloatArray,
-             step: float) -> FloatArray:
-    row = np.zeros((1, 1, WIDTH))
-    row[0, 0, :len(coefficients)] = coefficients
-    after = memory.copy()
-    remember(0, np.array([[law]]), row, np.zeros((1, 1), dtype=np.int64),
-             np.array(z), after, step)
-    return after
-
-
-@pytest.mark.parametrize('side', [0, 1])
-def test_heat_comes_to_its_balance(side: int) -> None:
-    memory = np.zeros(MEMORY)
-    for _ in range(4000):
-        memory = advanced(Law.HEATING, [0.001, 50.0, side], [4.0], memory, 0.1)
-    assert memory[side] == pytest.approx(16.0 * 50.0, rel=1e-3)
-    assert memory[1 - side] == 0.0
-
-
-@pytest.mark.parametrize('side', [0, 1])
-def test_play_is_crossed_and_then_ends(side: int) -> None:
-    """The motor runs ahead of the wheel by 1 rad/s across 0.195 rad of play, from its middle."""
-    memory, transmission, context = np.zeros(MEMORY), 3.5, np.zeros(CONTEXT)
-    context[6] = 0.01
-    p, z = [0.195, transmission, side], [transmission * 3.0, 2.0, 5.0]
-    torques = []
-    for _ in range(20):
-        torques.append(opcode(Law.BACKLASH, np.array(p), np.array(z), context, memory))
-        memory = advanced(Law.BACKLASH, p, z, memory, 0.01)
-    assert memory[2 + side] == pytest.approx(0.0975)
-    assert memory[3 - side] == 0.0
-    # No torque reaches the wheel (the effort takes T i away) until half the play is crossed.
-    # The step in which it ends lets a part of it through.
-    assert torques[:9] == [-transmission * 5.0] * 9
-    assert torques[9] == pytest.approx(-transmission * 5.0 * 0.75)
-    assert torques[10:] == [0.0] * 10

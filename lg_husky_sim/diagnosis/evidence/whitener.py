@@ -67,6 +67,20 @@ def _advance(z: FloatArray, j: int, dt: float, cosine: float, sine: float, fade_
 
 
 @jit_part
+def _propagate(z: FloatArray, left: float, longest: float, cosine: float, sine: float,
+               process: FloatArray, m: FloatArray) -> None:
+    # All columns of z over a time, by steps that are short enough.
+    while left > 1e-9:
+        dt = min(left, longest)
+        left -= dt
+        fade_f = np.exp(-dt / process[3])
+        fade_m = np.exp(-dt / process[4])
+        fade_d = np.exp(-dt / process[5])
+        for j in range(z.shape[1]):
+            _advance(z, j, dt, cosine, sine, fade_f, fade_m, fade_d, m)
+
+
+@jit_part
 def _transpose(p: FloatArray) -> None:
     for i in range(p.shape[0]):
         for j in range(i):
@@ -214,19 +228,11 @@ def whiten(residuals: FloatArray, times: FloatArray, channels: Integers, order: 
     """
     count = residuals.shape[1]
     z = np.zeros((12, count))
-    force_time, moment_time, drive_time = process[3], process[4], process[5]
     now = times[order[0]]
     for k in range(order.size):
         reading = order[k]
-        left = times[reading] - now
-        while left > 1e-9:
-            dt = min(left, longest)
-            left -= dt
-            fade_f = np.exp(-dt / force_time)
-            fade_m = np.exp(-dt / moment_time)
-            fade_d = np.exp(-dt / drive_time)
-            for j in range(count):
-                _advance(z, j, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+        _propagate(z, times[reading] - now, longest, cosine[reading], sine[reading], process,
+                   model)
         now = times[reading]
         channel = int(channels[reading])
         for j in range(count):
@@ -308,19 +314,11 @@ def whiten_switched(change: FloatArray, states: FloatArray, on: NDArray[np.uint8
     """
     count = on.shape[1]
     z = np.zeros((12, count))
-    force_time, moment_time, drive_time = process[3], process[4], process[5]
     now = times[order[0]]
     for k in range(order.size):
         reading = order[k]
-        left = times[reading] - now
-        while left > 1e-9:
-            dt = min(left, longest)
-            left -= dt
-            fade_f = np.exp(-dt / force_time)
-            fade_m = np.exp(-dt / moment_time)
-            fade_d = np.exp(-dt / drive_time)
-            for j in range(count):
-                _advance(z, j, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+        _propagate(z, times[reading] - now, longest, cosine[reading], sine[reading], process,
+                   model)
         now = times[reading]
         channel = int(channels[reading])
         for j in range(count):

@@ -54,6 +54,8 @@ def _better(evidence: Evidence, fit: Fit, window: str,
             options_of: Callable[[Evidence, Reading], Sequence[Reading]]) -> Fit:
     # One after the other: a fit has work for all threads itself.
     options = options_of(evidence, fit.point.reading)
+    if not options:
+        return fit
     points = [_read_so(evidence, fit, one) for one in options]
     promised = evidence.pool.map(_promise_of(evidence, fit), points)
     order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]

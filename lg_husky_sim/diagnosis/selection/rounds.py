@@ -195,7 +195,7 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         seen = _looks(evidence, base, pool, [t.hypothesis.effect for t in tried])
         chosen = list(seen[:few])
         known = {one.hypothesis.label for one in chosen}
-        chosen += [Look(t.hypothesis, _numbers(t), 0.0, np.zeros((0, 0))) for t in tried[:3]
+        chosen += [Look(t.hypothesis, numbers_of(t), 0.0, np.zeros((0, 0))) for t in tried[:3]
                    if t.hypothesis.label not in known]
         guide = replace(base.point, places=best.fit.point.places[:base.point.places.size])
         tried = fitted(evidence, base, chosen, [base.point, guide])
@@ -215,7 +215,7 @@ def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[T
         return tried
     places = best.fit.point.places[:base.point.places.size]
     again = attempt(evidence, base, best.hypothesis.at(None),
-                    [(base.point.at(places), _numbers(best))])
+                    [(base.point.at(places), numbers_of(best))])
     if again is None or again.score < best.score:
         return tried
     return [again, *(t for t in tried[1:] if t.hypothesis.effect != again.hypothesis.effect)]
@@ -249,7 +249,8 @@ def _looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     return sorted(seen, key=lambda one: penalty * one.hypothesis.size - one.gain)
 
 
-def _numbers(tried: Tried) -> Numbers:
+def numbers_of(tried: Tried) -> Numbers:
+    """Return the numbers of a fitted effect by name."""
     values = tried.fit.point.values
     return {p.name: values[p.name] for p in tried.hypothesis.free}
 
@@ -296,9 +297,9 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     for result in rough[:int(setting('fitted_whole'))]:
         own = result
         if own.hypothesis.onset is not None:
-            own = refined(evidence, base, own, attempt, _numbers)
+            own = refined(evidence, base, own, attempt, numbers_of)
         places = own.fit.point.places[:base.point.places.size]
-        again = attempt(evidence, base, own.hypothesis, [(base.point.at(places), _numbers(own))])
+        again = attempt(evidence, base, own.hypothesis, [(base.point.at(places), numbers_of(own))])
         found.append(again if again is not None and again.gain >= own.gain else own)
     found += rough[len(found):]
     found.sort(key=lambda t: -t.score)

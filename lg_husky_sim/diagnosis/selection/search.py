@@ -14,8 +14,10 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.elimination import eliminated
 from lg_husky_sim.diagnosis.selection.rounds import (
+    attempt,
     calibrated,
     fitted,
+    numbers_of,
     play_round,
     Round,
     Tried,
@@ -79,20 +81,21 @@ def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]
     return evidence, evidence.fit(with_jitter(chosen.point, evidence))
 
 
-def _seeds(evidence: Evidence, rough: Point, base: Fit, early: Sequence[Tried]) -> list[Tried]:
+def _seeds(evidence: Evidence, rough: Fit, base: Fit, early: Sequence[Tried]) -> list[Tried]:
     # Where the numbers of the robot, and the noise, have taken an effect's place, what the effect
     # gains with numbers and noise of its own.
-    names = [u.name for u in rough.unknowns]
+    names = [u.name for u in rough.point.unknowns]
     if (not early or 0.5 * float(np.sum(base.point.strain ** 2)) < setting('distorted')
             or names != [u.name for u in base.point.unknowns]):
         return []
-    best = early[0]
-    there = replace(rough, places=best.fit.point.places[:len(names)])
-    begins = [best.fit.point, *(best.hypothesis.point(there, start)
-                                for start in best.hypothesis.starts)]
-    costs = [evidence.cost(evidence.residuals(evidence.predict(p)), p) for p in begins]
-    own, fit = calibrated(evidence, begins[int(np.argmin(costs))], 1)
-    return [Tried(best.hypothesis, fit, own.fit(base.point).cost - fit.cost, own.count)]
+    one = early[0].hypothesis
+    there = replace(rough.point, places=early[0].fit.point.places[:len(names)])
+    best = attempt(evidence, rough, one, [(there, start) for start in (
+        numbers_of(early[0]), *one.starts)], whole=False)
+    if best is None:
+        return []
+    own, fit = calibrated(evidence, best.fit.point, 1)
+    return [Tried(one, fit, own.fit(base.point).cost - fit.cost, own.count)]
 
 
 def _nominal(point: Point) -> Point:
@@ -130,7 +133,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     chosen, better = _as_logged(evidence, base)
     postponed = bool(better)
     evidence, base = _read_as(evidence, base, chosen)
-    seeds = _seeds(first, rough.point, base, early)
+    seeds = _seeds(first, rough, base, early)
     usual = Reading()
     start = _nominal(base.point)
     plain = base

@@ -1,0 +1,77 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Coefficients of the confidence follow from outcomes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from lg_husky_sim.cli.main import run
+from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.proof import outcomes
+from lg_husky_sim.proof.calibration import calibrated
+import numpy as np
+import pytest
+
+
+def line(name: str, right: bool, **features: Any) -> dict[str, Any]:
+    """Return the outcome of a slope that was called right or wrong."""
+    said = 'slope' if right else 'payload'
+    true = {'effect': 'slope', 'in_list': True, 'severity': 'medium', 'side': 'both',
+            'form': '', 'size': 1.0, 'related_answers': [], 'onset': None,
+            'subsystem': 'translation'}
+    return {'case': name, 'kind': 'single', 'level': 'clear', 'world': 'w', 'regime': {},
+            'unseen': [], 'nats': [], 'true': [true], 'verdict': 'known', 'confidence': 0.9,
+            'said': [{'effect': said, 'side': 'both', 'subsystem': 'translation',
+                      'onset': {'kind': 'none'}, 'gain': 50.0, 'rivals': []}],
+            'groups': [], 'failed': '', 'held_out': [], 'held_out_failed': '', 'seconds': 1.0,
+            'features': features}
+
+
+def lines(count: int) -> list[dict[str, Any]]:
+    """Return outcomes whose share right rises with the margin."""
+    rng = np.random.default_rng(2)
+    margins = rng.uniform(0.02, 1.0, count)
+    return [line(f'c{i}', bool(rng.uniform() < m), margin=m, share=0.1, chance=1e-9)
+            for i, m in enumerate(margins)]
+
+
+def test_a_margin_that_informs_gets_weight_and_the_share_right_is_kept() -> None:
+    rows = lines(400)
+    found = calibrated(rows)
+    constant, margin, share = (found[n][0] for n in (
+        'name_constant', 'name_margin', 'name_share'))
+    assert margin > 0.5
+    stated = [1.0 / (1.0 + np.exp(-(constant + margin * np.log(r['features']['margin'])
+                                    + share * np.log1p(0.1)))) for r in rows]
+    assert np.mean(stated) == pytest.approx(found['name_margin'][2] / 400, abs=0.02)
+    assert found['name_margin'][1] == 400
+    assert found['unknown_constant'][1] == 0
+
+
+def test_few_outcomes_do_not_make_certainty() -> None:
+    found = calibrated([line('a', True, margin=1.0, share=0.0, chance=0.0)])
+    assert 1.0 / (1.0 + np.exp(-found['name_constant'][0])) < 0.97
+
+
+@pytest.mark.parametrize(('features', 'named'), [
+    ({'margin': 0.5, 'share': 0.1}, 'case bad'), ({'margin': None, 'share': 0.1, 'chance': 1.0},
+                                                  'case bad'), ({}, 'no outcome')])
+def test_outcomes_without_what_it_needs_are_refused(features: dict[str, Any], named: str) -> None:
+    damaged = {**line('bad', True, **features), 'verdict': 'nothing_missing'}
+    if features and 'chance' in features:
+        damaged['verdict'] = 'known'
+    with pytest.raises(LgHuskyError, match=named):
+        calibrated([damaged])
+
+
+def test_command_prints_what_stands_in_the_settings(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'outcomes.jsonl'
+    outcomes.write(path, {'command': 'c', 'commit': 'x', 'planned': 5, 'seal': '', 'seeds': '-',
+                          'set': 'tuning'}, lines(5))
+    assert run(['prove', '--from', str(path), '--calibrate']) == 0
+    assert 'name_margin: ' in capsys.readouterr().out
+    assert run(['prove', '--calibrate']) != 0
+    assert '--from' in capsys.readouterr().err
