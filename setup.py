@@ -36,9 +36,9 @@ EXTRAS = {
 EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report', 'search')
                  for need in EXTRAS[extra]]
 EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale'], *EXTRAS['tables']]
-EXTRAS['test'] = ['hypothesis>=6.100', 'ipykernel>=6', 'nbclient>=0.10', 'nbformat>=5.9',
-                  'pytest>=8', 'pytest-rerunfailures>=16.7', 'pytest-xdist>=3.5',
-                  'setuptools>=70.1']
+EXTRAS['test'] = ['hypothesis>=6.100', 'ipykernel>=6', 'jsonschema>=4.18', 'nbclient>=0.10',
+                  'nbformat>=5.9', 'pytest>=8', 'pytest-rerunfailures>=16.7',
+                  'pytest-xdist>=3.5', 'setuptools>=70.1']
 EXTRAS['docs'] = ['mkdocs-material~=9.8', 'mkdocstrings[python]>=0.27']
 EXTRAS['dev'] = [
     *EXTRAS['test'],

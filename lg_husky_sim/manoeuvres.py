@@ -42,6 +42,29 @@ MOST_SAMPLES = 5_000_000
 FASTEST = 100.0
 """Largest speed [m/s] or yaw rate [rad/s] that is no slip of the pen."""
 
+_SPEED = {'type': 'number', 'minimum': -FASTEST, 'maximum': FASTEST, 'default': 0.0}
+STEP: dict[str, Any] = {
+    'type': 'object', 'additionalProperties': False, 'required': ['duration'],
+    'properties': {
+        'duration': {'type': 'number', 'exclusiveMinimum': 0.0, 'maximum': LONGEST,
+                     'description': 'How long the step lasts [s], the ramp included.'},
+        'forward': {**_SPEED, 'description': 'Commanded forward speed [m/s].'},
+        'yaw': {**_SPEED, 'description': 'Commanded yaw rate [rad/s], positive to the left.'},
+        'ramp': {'type': 'number', 'minimum': 0.0, 'maximum': LONGEST, 'default': 0.0,
+                 'description': 'Time [s] in which the command moves there linearly from the '
+                 'step before; 0 for a jump.'}}}
+"""What a step may hold, as JSON schema; the order is that of :class:`Step`."""
+SCRIPT: dict[str, Any] = {
+    'type': 'object', 'additionalProperties': False, 'required': ['schema', 'steps'],
+    'properties': {
+        'schema': {'const': SCHEMA},
+        'about': {'type': ['string', 'number', 'boolean', 'null'],
+                  'description': 'One line on what it is.'},
+        'rate': {'type': 'number', 'exclusiveMinimum': 0.0, 'maximum': LARGEST_RATE,
+                 'default': DEFAULT_RATE, 'description': 'Commands sent per second [Hz].'},
+        'steps': {'type': 'array', 'minItems': 1, 'items': STEP}}}
+"""What a script may hold, as JSON schema."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -235,23 +258,23 @@ def _mapping(what: str, value: object) -> dict[str, Any]:
 
 def _manoeuvre(name: str, entry: object) -> Manoeuvre:
     data = _mapping(f'manoeuvre {name}', entry)
-    _known(data, ('about', 'rate', 'steps'))
+    _known(data, tuple(key for key in SCRIPT['properties'] if key != 'schema'))
     steps = data.get('steps')
     if not isinstance(steps, list):
         raise CommandError('steps is not a list')
     return Manoeuvre(
         name, tuple(_step(place + 1, step) for place, step in enumerate(steps)),
-        _number('rate', data.get('rate', DEFAULT_RATE)), str(data.get('about', '')))
+        _number('rate', data.get('rate', DEFAULT_RATE)), _text('about', data.get('about')))
 
 
 def _step(place: int, entry: object) -> Step:
     try:
         data = _mapping('the step', entry)
-        _known(data, ('duration', 'forward', 'yaw', 'ramp'))
+        _known(data, tuple(STEP['properties']))
         if 'duration' not in data:
             raise CommandError('duration is missing')
         return Step(*(_number(key, data.get(key, 0.0))
-                      for key in ('duration', 'forward', 'yaw', 'ramp')))
+                      for key in STEP['properties']))
     except CommandError as error:
         raise CommandError(f'step {place}: {error}') from error
 
@@ -262,6 +285,12 @@ def _known(data: Mapping[str, Any], keys: tuple[str, ...]) -> None:
             raise CommandError(f'unknown key {shown(key)} (allowed: {", ".join(keys)})')
 
 
+def _text(name: str, value: object) -> str:
+    if isinstance(value, (dict, list)):
+        raise CommandError(f'{name} = {shown(value)} is not a text')
+    return '' if value is None else str(value)
+
+
 def _number(name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise CommandError(f'{name} = {shown(value)} is not a number')
@@ -269,3 +298,8 @@ def _number(name: str, value: object) -> float:
         return float(value)
     except OverflowError as error:
         raise CommandError(f'{name} is too large') from error
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON schema of a command script."""
+    return {'title': 'Command script of lg_husky', **SCRIPT}

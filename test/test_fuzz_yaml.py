@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import copy
 from dataclasses import dataclass
+import json
 import math
 from pathlib import Path
 import random
@@ -14,6 +15,8 @@ import re
 import time
 from typing import Any
 
+import jsonschema
+from lg_husky_sim.cli.schema import schema_of
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.linear_graph import compile_numeric
@@ -71,6 +74,7 @@ class Reader:
     read: Callable[[Path], Any]
     agrees: Callable[[Any, Any], None]
     count: int
+    kind: str
 
 
 def model_agrees(model: Any, data: Any) -> None:
@@ -121,13 +125,14 @@ def netlist_agrees(netlist: Any, data: Any) -> None:
 
 READERS = {
     'parameters': Reader(lambda: config_path('husky.yaml').read_text(encoding='utf-8'),
-                         load_model, model_agrees, 300),
+                         load_model, model_agrees, 300, 'model'),
     'model with effects': Reader(
         lambda: config_path('husky.yaml').read_text(encoding='utf-8').replace(
             '\neffects: []', '') + EFFECTS,
-        load_model, model_agrees, 350),
-    'command script': Reader(lambda: SCRIPT, load_manoeuvre, script_agrees, 350),
-    'netlist': Reader(lambda: NETLIST, read_and_derive, netlist_agrees, 350),
+        load_model, model_agrees, 350, 'model'),
+    'command script': Reader(lambda: SCRIPT, load_manoeuvre, script_agrees, 350,
+                             'commands'),
+    'netlist': Reader(lambda: NETLIST, read_and_derive, netlist_agrees, 350, 'graph'),
 }
 
 
@@ -183,6 +188,7 @@ def damaged_bytes(text: str, dice: random.Random) -> bytes:
 def test_damaged_files_are_refused_in_one_line_or_read_as_they_stand(
         name: str, tmp_path: Path) -> None:
     reader = READERS[name]
+    editor = jsonschema.Draft7Validator(schema_of(reader.kind))
     seed = reader.seed()
     sound = tmp_path / 'sound.yaml'
     sound.write_text(seed, encoding='utf-8')
@@ -210,7 +216,10 @@ def test_damaged_files_are_refused_in_one_line_or_read_as_they_stand(
                         f'{path.read_bytes()!r}'[:3000])
         else:
             outcomes['read'] += 1
-            reader.agrees(value, parse_yaml(path.read_text(encoding='utf-8')))
+            said = parse_yaml(path.read_text(encoding='utf-8'))
+            reader.agrees(value, said)
+            # An editor with the schema marks nothing of it; JSON has no dates, only texts.
+            assert list(editor.iter_errors(json.loads(json.dumps(said, default=str)))) == []
         assert time.process_time() - began < LONGEST
     assert outcomes['refused'] > reader.count / 4, outcomes
     # Some survive (a changed comment, a value within its bounds), so that agreement is seen too.

@@ -40,6 +40,7 @@ VERBS = {
     'effects': 'lg_husky_sim.cli.effects',
     'parameters': 'lg_husky_sim.cli.parameters',
     'manoeuvres': 'lg_husky_sim.cli.manoeuvres',
+    'schema': 'lg_husky_sim.cli.schema',
 }
 """Verb to the module whose `command` is its click command, in the order of a newcomer's tour."""
 

@@ -15,14 +15,13 @@ from typing import Any
 from lg_husky_sim.errors import LgHuskyError, ModelFileError, ParameterError
 from lg_husky_sim.husky.effects import check_distinct, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import Drivetrain, Structure
+from lg_husky_sim.husky.model_schema import EFFECT, ONSET, PARAMETER, SCHEMA, STRUCTURE, TOP
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.yaml_files import read_yaml, shown, yaml_text
 
-SCHEMA = 'lg_husky_sim/model/1'
 PAPER = 'paper'
 """Name of the packaged model where a file is asked for."""
-_KEYS = {'value', 'unit', 'lower', 'upper', 'tolerance', 'free', 'source', 'low', 'high'}
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,13 @@ def _number(name: str, key: str, value: object) -> float:
     return number
 
 
+def _text(what: str, value: object) -> str:
+    # A key without a value is an empty text.
+    if isinstance(value, (dict, list)):
+        raise ModelFileError(f'{what} = {shown(value)} is not a text')
+    return '' if value is None else str(value)
+
+
 def _mapping(what: str, value: object) -> dict[str, Any]:
     if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
         raise ModelFileError(f'{what} is not a mapping of names')
@@ -69,12 +75,13 @@ def _mapping(what: str, value: object) -> dict[str, Any]:
 
 def _parameter(name: str, entry: object) -> Parameter:
     data = _mapping(f'parameter {name}', entry)
-    unknown = sorted(set(data) - _KEYS)
+    keys = PARAMETER['properties']
+    unknown = sorted(set(data) - set(keys))
     if unknown:
         raise ModelFileError(
             f'parameter {name}: unknown key {shown(unknown[0])} '
-            f'(allowed: {", ".join(sorted(_KEYS))})')
-    for key in ('value', 'unit', 'lower', 'upper', 'source'):
+            f'(allowed: {", ".join(sorted(keys))})')
+    for key in PARAMETER['required']:
         if key not in data:
             raise ModelFileError(f'parameter {name}: {key} is missing')
     free = data.get('free', False)
@@ -83,16 +90,16 @@ def _parameter(name: str, entry: object) -> Parameter:
     interval = [None if data.get(key) is None else _number(name, key, data[key])
                 for key in ('low', 'high')]
     return Parameter(
-        name, _number(name, 'value', data['value']), str(data['unit']),
+        name, _number(name, 'value', data['value']), _text(f'{name}: unit', data['unit']),
         _number(name, 'lower', data['lower']), _number(name, 'upper', data['upper']),
-        str(data['source']), _number(name, 'tolerance', data.get('tolerance', 0.0)), free,
-        *interval)
+        _text(f'{name}: source', data['source']),
+        _number(name, 'tolerance', data.get('tolerance', 0.0)), free, *interval)
 
 
 def _effect(index: int, entry: object, shared: set[str]
             ) -> tuple[Effect, tuple[Parameter, ...]]:
     data = _mapping(f'effect {index + 1}', entry)
-    unknown = sorted(set(data) - {'effect', 'side', 'shape', 'late', 'again', 'parameters'})
+    unknown = sorted(set(data) - set(EFFECT['properties']))
     if unknown:
         raise ModelFileError(f'effect {index + 1}: unknown key {shown(unknown[0])}')
     flags = {name: data.get(name, False) for name in ('late', 'again')}
@@ -100,8 +107,9 @@ def _effect(index: int, entry: object, shared: set[str]
         if not isinstance(flag, bool):
             raise ModelFileError(
                 f'effect {index + 1}: {name} = {shown(flag)} is neither true nor false')
-    effect = Effect(str(data.get('effect', '')), str(data.get('side') or ''),
-                    str(data.get('shape') or ''), **flags)
+    name, side, shape = (_text(f'effect {index + 1}: {key}', data.get(key))
+                         for key in ('effect', 'side', 'shape'))
+    effect = Effect(name, side, shape, **flags)
     given = _mapping(f'effect {effect.id}: parameters', data.get('parameters', {}))
     known = {p.name: p for p in effect.parameters()}
     parameters = []
@@ -120,11 +128,6 @@ def _effect(index: int, entry: object, shared: set[str]
     return effect, tuple(parameters)
 
 
-def _text(value: object) -> str:
-    # A key without a value is an empty text.
-    return '' if value is None else str(value)
-
-
 def _refuse_others(where: str, entry: Mapping[str, object], allowed: Sequence[str]) -> None:
     other = next((key for key in entry if key not in allowed), None)
     if other is not None:
@@ -135,17 +138,17 @@ def _onset(data: object) -> Onset | None:
     if data is None:
         return None
     entry = _mapping('structure.onset', data)
-    _refuse_others('structure.onset', entry, ('kind', 'value', 'recording', 'earlier'))
+    _refuse_others('structure.onset', entry, tuple(ONSET['properties']))
     kinds = [kind.value for kind in OnsetKind]
     if entry.get('kind') not in kinds:
         raise ModelFileError(
             f'structure.onset.kind = {shown(entry.get("kind"))} is not one of {", ".join(kinds)}')
-    earlier = entry.get('earlier') or []
+    earlier = [] if entry.get('earlier') is None else entry['earlier']
     if not isinstance(earlier, list) or not all(isinstance(name, str) for name in earlier):
         raise ModelFileError('structure.onset.earlier is not a list of names of recordings')
     return Onset(OnsetKind(entry['kind']), _number('structure.onset', 'value',
                                                    entry.get('value')),
-                 _text(entry.get('recording')), tuple(earlier))
+                 _text('structure.onset.recording', entry.get('recording')), tuple(earlier))
 
 
 def model_from_data(data: object, name: str) -> ModelFile:
@@ -172,11 +175,11 @@ def model_from_data(data: object, name: str) -> ModelFile:
         content = _mapping('the file', data)
         if content.get('schema') != SCHEMA:
             raise ModelFileError(f'schema is {shown(content.get("schema"))}, expected {SCHEMA!r}')
-        unknown = sorted(set(content) - {'schema', 'about', 'structure', 'parameters', 'effects'})
+        unknown = sorted(set(content) - set(TOP['properties']))
         if unknown:
             raise ModelFileError(f'unknown key {shown(unknown[0])}')
         structure = _mapping('structure', content.get('structure', {}))
-        _refuse_others('structure', structure, ('drivetrain', 'onset'))
+        _refuse_others('structure', structure, tuple(STRUCTURE['properties']))
         drivetrains = [d.value for d in Drivetrain]
         drivetrain = structure.get('drivetrain', 'simplified')
         if drivetrain not in drivetrains:
@@ -184,7 +187,7 @@ def model_from_data(data: object, name: str) -> ModelFile:
                                  f'{", ".join(drivetrains)}')
         entries = [_parameter(key, entry) for key, entry in _mapping(
             'parameters', content.get('parameters')).items()]
-        listed = content.get('effects') or []
+        listed = [] if content.get('effects') is None else content['effects']
         if not isinstance(listed, list):
             raise ModelFileError('effects is not a list')
         shared = {p.name for p in entries}
@@ -198,7 +201,7 @@ def model_from_data(data: object, name: str) -> ModelFile:
         missing = [p for p in nominal if p not in parameters]
         if missing:
             raise ModelFileError(f'parameter {missing[0]} is missing')
-        return ModelFile(shape, parameters, _text(content.get('about')))
+        return ModelFile(shape, parameters, _text('about', content.get('about')))
     except LgHuskyError as error:
         raise ModelFileError(f'{name}: {error}') from error
 

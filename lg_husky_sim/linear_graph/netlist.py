@@ -24,7 +24,7 @@ with a unit, which then is a parameter of the element's name.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 import re
@@ -37,7 +37,6 @@ from lg_husky_sim.linear_graph.elements import (
     Characteristic,
     Domain,
     Form,
-    Kind,
     Port,
     SOURCES,
     TWO_PORT_KINDS,
@@ -45,31 +44,19 @@ from lg_husky_sim.linear_graph.elements import (
 )
 from lg_husky_sim.linear_graph.expressions import is_name, names_in
 from lg_husky_sim.linear_graph.graph import GROUND, LinearGraph, suggestion
+from lg_husky_sim.linear_graph.netlist_schema import (
+    ELEMENTS,
+    LONGEST_TEXT,
+    ONE_PORT,
+    PORT,
+    QUANTITY,
+    TOP,
+    TWO_PORT,
+)
 from lg_husky_sim.linear_graph.units import check_units, parse_unit, unit_needed
 
-_EVERYDAY: Mapping[Domain, Mapping[str, Kind]] = {
-    Domain.ELECTRICAL: {
-        'voltage source': Kind.ACROSS_SOURCE, 'current source': Kind.THROUGH_SOURCE,
-        'capacitor': Kind.A_TYPE, 'inductor': Kind.T_TYPE, 'resistor': Kind.D_TYPE},
-    Domain.TRANSLATIONAL: {
-        'velocity source': Kind.ACROSS_SOURCE, 'force source': Kind.THROUGH_SOURCE,
-        'mass': Kind.A_TYPE, 'spring': Kind.T_TYPE, 'damper': Kind.D_TYPE},
-    Domain.ROTATIONAL: {
-        'speed source': Kind.ACROSS_SOURCE, 'torque source': Kind.THROUGH_SOURCE,
-        'inertia': Kind.A_TYPE, 'torsion spring': Kind.T_TYPE, 'rotary damper': Kind.D_TYPE},
-    Domain.FLUID: {
-        'pressure source': Kind.ACROSS_SOURCE, 'flow source': Kind.THROUGH_SOURCE,
-        'tank': Kind.A_TYPE, 'inertance': Kind.T_TYPE, 'valve': Kind.D_TYPE},
-    Domain.THERMAL: {
-        'temperature source': Kind.ACROSS_SOURCE, 'heat source': Kind.THROUGH_SOURCE,
-        'heat capacity': Kind.A_TYPE, 'thermal resistance': Kind.D_TYPE}}
-ELEMENTS: Mapping[str, tuple[Kind, Domain]] = {
-    name: (kind, domain) for domain, names in _EVERYDAY.items() for name, kind in names.items()}
-_TOP = {'name', 'about', 'ground', 'parameters', 'elements', 'outputs'}
-_ONE = {'is', 'from', 'to', 'value', 'form', 'law', 'of', 'parameters'}
-_TWO = {'is', 'port 1', 'port 2', 'value', 'law', 'of', 'parameters'}
 Ground = str | dict[Domain, str]
-_QUANTITY = re.compile(r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*', re.ASCII)
+_QUANTITY = re.compile(QUANTITY, re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -147,8 +134,9 @@ def parse_netlist(text: str, source: str = 'netlist') -> Netlist:
 
 
 def _netlist(data: Any) -> Netlist:
-    top = _mapping(data, 'the file', _TOP)
-    parameters = _mapping(top.get('parameters') or {}, 'parameters', None)
+    top = _mapping(data, 'the file', TOP['properties'])
+    parameters = _mapping({} if top.get('parameters') is None else top['parameters'],
+                          'parameters', None)
     values: dict[str, float] = {}
     units: dict[str, str] = {}
     for name, given in parameters.items():
@@ -181,7 +169,7 @@ def _netlist(data: Any) -> Netlist:
     check_complete(graph)
     check_symbols(graph)
     check_units(graph, units)
-    outputs = tuple(_texts(top.get('outputs') or [], 'outputs'))
+    outputs = tuple(_texts([] if top.get('outputs') is None else top['outputs'], 'outputs'))
     for output in outputs:
         graph.variable(output)
     used = {name for branch in branches for name in _names(branch)}
@@ -209,7 +197,7 @@ def _element(name: str, given: Any, values: dict[str, float], units: dict[str, s
     what = _text(entry.get('is', ''), 'is')
     two_ports = {kind.value: kind for kind in TWO_PORT_KINDS}
     if what in two_ports:
-        _known(entry, f'element {name!r}', _TWO)
+        _known(entry, f'element {name!r}', TWO_PORT['properties'])
         ports = [_port(entry.get(f'port {number}'), f'port {number}', ground)
                  for number in (1, 2)]
         law = _law(entry)
@@ -220,7 +208,7 @@ def _element(name: str, given: Any, values: dict[str, float], units: dict[str, s
     if what not in ELEMENTS:
         raise ModelFileError(f'is: {what!r} is no element'
                              f'{suggestion(what, (*ELEMENTS, *two_ports))}')
-    _known(entry, f'element {name!r}', _ONE)
+    _known(entry, f'element {name!r}', ONE_PORT['properties'])
     kind, domain = ELEMENTS[what]
     form = None
     if 'form' in entry:
@@ -284,7 +272,7 @@ def _law(entry: Mapping[str, Any]) -> Characteristic | None:
 
 
 def _port(given: Any, what: str, ground: Ground) -> Port:
-    entry = _mapping(given, what, {'domain', 'from', 'to'})
+    entry = _mapping(given, what, PORT['properties'])
     domains = {domain.value: domain for domain in Domain}
     text = _text(entry.get('domain', ''), 'domain')
     if text not in domains:
@@ -297,7 +285,7 @@ def _ground(given: Any) -> Ground:
     if isinstance(given, str):
         return given
     domains = {domain.value: domain for domain in Domain}
-    entry = _mapping(given, 'ground', set(domains))
+    entry = _mapping(given, 'ground', domains)
     return {domains[key]: _text(node, 'ground') for key, node in entry.items()}
 
 
@@ -315,7 +303,7 @@ def _node(entry: Mapping[str, Any], key: str, default: str | None) -> str:
     return given
 
 
-def _mapping(given: Any, what: str, known: set[str] | None) -> Mapping[str, Any]:
+def _mapping(given: Any, what: str, known: Collection[str] | None) -> Mapping[str, Any]:
     if not isinstance(given, dict):
         raise ModelFileError(f'{what} must be entries of the form key: value')
     for key in given:
@@ -326,14 +314,14 @@ def _mapping(given: Any, what: str, known: set[str] | None) -> Mapping[str, Any]
     return given
 
 
-def _known(given: Mapping[str, Any], what: str, known: set[str]) -> None:
+def _known(given: Mapping[str, Any], what: str, known: Collection[str]) -> None:
     for key in given:
         if key not in known:
             raise ModelFileError(f'{what}: unknown key {key!r}{suggestion(key, sorted(known))}')
 
 
 def _text(given: Any, what: str) -> str:
-    if not isinstance(given, str) or len(given) > 2000:
+    if not isinstance(given, str) or len(given) > LONGEST_TEXT:
         raise ModelFileError(f'{what} must be a short text')
     return given
 

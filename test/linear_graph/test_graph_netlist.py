@@ -17,7 +17,8 @@ from lg_husky_sim.linear_graph import (
     Form,
     Kind,
 )
-from lg_husky_sim.linear_graph.netlist import ELEMENTS, parse_netlist, read_netlist
+from lg_husky_sim.linear_graph.netlist import parse_netlist, read_netlist
+from lg_husky_sim.linear_graph.netlist_schema import ELEMENTS
 import numpy as np
 import pytest
 

@@ -47,7 +47,7 @@ def test_the_page_runs_and_prints_what_it_says(
 def test_the_table_of_elements_names_each_and_its_unit() -> None:
     from lg_husky_sim.linear_graph import Branch
     from lg_husky_sim.linear_graph.elements import SOURCES
-    from lg_husky_sim.linear_graph.netlist import ELEMENTS
+    from lg_husky_sim.linear_graph.netlist_schema import ELEMENTS
     from lg_husky_sim.linear_graph.units import unit_needed
     page = PAGE.read_text(encoding='utf-8')
     for name, (kind, domain) in ELEMENTS.items():
