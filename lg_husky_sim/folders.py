@@ -29,7 +29,7 @@ def check_folder(path: Path) -> None:
         If something else is there, or nothing can be written there.
     """
     if (path.exists() or path.is_symlink()) and not path.is_dir():
-        raise SettingsError(f'{path} exists and is no folder; choose another name')
+        raise SettingsError(f'{path} exists and is not a folder; choose another name')
     if (path / 'metadata.yaml').is_file():
         raise SettingsError(f'{path} is a recording; choose another folder for the results')
     target = path.resolve()

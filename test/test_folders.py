@@ -98,7 +98,7 @@ def test_a_list_of_results_reaches_no_farther_than_its_folder(tmp_path: Path) ->
 
 def test_results_go_into_no_file_and_no_recording(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('mine')
-    with pytest.raises(SettingsError, match='file exists and is no folder'):
+    with pytest.raises(SettingsError, match='file exists and is not a folder'):
         check_folder(tmp_path / 'file')
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'metadata.yaml').write_text('mine')

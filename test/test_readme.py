@@ -90,7 +90,7 @@ def complaint(arguments: list[str]) -> str:
     verb, *rest = arguments
     command = cli.get_command(context, verb)
     if command is None:
-        return f'{verb} is no verb'
+        return f'{verb} is not a verb'
     known = {opt for parameter in command.params
              for opt in (*parameter.opts, *parameter.secondary_opts)} | {'-h', '--help'}
     if isinstance(command, click.Group):
@@ -105,7 +105,7 @@ def complaint(arguments: list[str]) -> str:
 
 
 def test_wrong_commands_are_seen() -> None:
-    assert complaint(['compar', 'x']) == 'compar is no verb'
+    assert complaint(['compar', 'x']) == 'compar is not a verb'
     assert complaint(['compare', 'x', '--oot', 'y']) == 'compare has no option --oot'
     assert commands('    ./run compare REC --out DIR  # a note\n') == [
         ['compare', 'REC', '--out', 'DIR']]

@@ -70,7 +70,7 @@ class DiagnosisResult:
     def headline(self) -> str:
         """The answer in one sentence."""
         from lg_husky_sim.diagnosis.output import headline
-        return headline(self.diagnosis)
+        return headline(self.diagnosis, bool(self.baseline))
 
     @property
     def husky(self) -> Husky:
@@ -174,7 +174,7 @@ class DiagnosisResult:
     def __str__(self) -> str:
         """Return the answer as text."""
         from lg_husky_sim.diagnosis.output import summary_text
-        return summary_text(self.diagnosis)
+        return summary_text(self.diagnosis, bool(self.baseline))
 
     def _repr_html_(self) -> str:
         return page_part(

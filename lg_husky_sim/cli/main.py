@@ -72,7 +72,7 @@ class LazyGroup(click.Group):
             known = self.list_commands(ctx)
             near = difflib.get_close_matches(verb, known, n=1)
             hint = f'; did you mean {near[0]}?' if near else ''
-            message = f'{verb} is no verb{hint} (there are: {", ".join(known)})'
+            message = f'{verb} is not a verb{hint} (there are: {", ".join(known)})'
             raise click.UsageError(message, ctx)
         return super().resolve_command(ctx, args)
 

@@ -52,9 +52,9 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     candidates = drives(max_speed, max_yaw)
     with tqdm(total=len(candidates), desc='drives', disable=None, leave=False) as bar:
         ranked = plan(one, two, candidates, bar.update)
-    click.echo(f'{one.name} against {two.name}: evidence that one recording of the drive would '
-               'give, whichever is true')
-    click.echo(f'{"drive":18} {"length":>7} {"evidence":>10}  says most')
+    click.echo(f'{one.name} against {two.name}: expected evidence from one recording of each '
+               'drive, whichever of the two is true')
+    click.echo(f'{"drive":18} {"length":>7} {"evidence":>10}  best channel')
     for row in ranked:
         click.echo(f'{row.manoeuvre.name:18} {row.manoeuvre.duration:5.0f} s '
                    f'{row.nats:8.1f} nats  {row.channel}')
@@ -63,7 +63,7 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
                                 f'by {best.nats:.0f} nats')
     click.echo(f'{out}: {best.manoeuvre.name}, {best.manoeuvre.about}')
     if best.nats < setting('decisive'):
-        click.echo('None of these drives decides: another sensor is needed, or more speed.')
+        click.echo('None of these drives is decisive: another sensor is needed, or more speed.')
 
 
 def _from_ids(text: str, robot: Path | None) -> tuple[Rival, Rival]:
@@ -88,24 +88,24 @@ def _from_folder(folder: Path) -> tuple[Rival, Rival]:
     from lg_husky_sim.husky.model_file import load_model
     place = folder / 'diagnosis.json'
     if not place.is_file():
-        raise SettingsError(f'{folder} is no folder of a diagnosis: it holds no diagnosis.json')
+        raise SettingsError(f'{folder} is not the folder of a diagnosis: it has no diagnosis.json')
     try:
         data = json.loads(place.read_text(encoding='utf-8'))
         finding = data['findings'][0] if data['findings'] else None
         rivals = [(str(r['effect']), str(r['side'])) for r in finding['rivals']] if finding else []
         name = str(finding['effect']) if finding else ''
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise SettingsError(f'{place} is no diagnosis: {error}') from error
+        raise SettingsError(f'{place} is not a diagnosis: {error}') from error
     rivals = [(effect, side) for effect, side in rivals if effect != name]
     if not finding or name == 'unknown' or not rivals:
         raise SettingsError(
-            f'{place} names no effect with a rival; there is nothing to tell apart')
+            f'{place} names no effect with a competing one, so there is nothing to tell apart')
     plain, model = load_model(folder / 'plain.yaml'), load_model(folder / 'model.yaml')
     first = next((e for e in model.structure.effects
                   if e.id == name and e not in plain.structure.effects), None)
     if first is None:
-        raise SettingsError(f'{folder / "model.yaml"} has no {name} that plain.yaml has not, and '
-                            f'{place} names it: these are not of one diagnosis')
+        raise SettingsError(f'{place} names {name}, but {folder / "model.yaml"} does not add it '
+                            'to plain.yaml: these files are not from one diagnosis')
     found = typical(name, plain.structure, model.parameters, first.side)
     numbers = {p.name: model.parameters[p.name] for p in first.parameters()}
     one = Rival(name, found.structure, found.parameters.replacing(numbers), (numbers,))

@@ -169,5 +169,5 @@ def _scatter_notes(traces: Sequence[Trace]) -> list[str]:
         if scatter > SCATTER * min(float(np.sqrt(np.nanmean(error ** 2))) for error in errors):
             said.append(f'{trace.recording}: the measured forward speed is the rate of change of '
                         f'the pose, and scatters by at least {number(scatter, 2)} m/s by itself: '
-                        'that much of its error is no fault of a model.')
+                        'that much of its error is not due to a model.')
     return said

@@ -201,7 +201,7 @@ def unknown_finding(search: Search, rest: Sequence[Effort]) -> Finding:
              'torque_right': 'a torque on the right wheels'}[first.balance]
     largest = float(np.max(np.abs(first.values), initial=0.0))
     unit = 'N' if first.balance == 'force' else 'N·m'
-    text = (f'None of the known effects explains it; its best description is {where} as a smooth '
+    text = (f'No effect of the catalogue explains it; it is best described as {where}, a smooth '
             f'function of {first.argument.replace("_", " ")}, up to {largest:.3g} {unit}.')
     side = {'torque_left': 'left', 'torque_right': 'right'}.get(first.balance, 'none')
     elements = {'force': ('M_H',), 'moment': ('J_H',), 'torque_left': ('J_LW',),

@@ -148,15 +148,16 @@ def _remaining(found: Search, rest: Sequence[Effort]) -> str:
     text = []
     if rest and rest[0].evidence > 0.0:
         first = rest[0]
-        text.append(f'the best smooth description of what is left is a {first.balance} by '
+        text.append(f'the best smooth description of the remaining residual is a '
+                    f'{first.balance.replace("_", " ")} as a function of '
                     f'{first.argument.replace("_", " ")}, with a log evidence of '
                     f'{first.evidence:.1f} nats')
     last = found.rounds[-1]
     if last.tried and not (found.found and last is found.rounds[len(found.found) - 1]):
         best = last.tried[0]
-        text.append(f'the best further effect would be {best.hypothesis.effect.id} with a gain '
-                    f'of {best.gain:.1f} nats, which chance alone reaches with a probability of '
-                    f'{last.chance:.2g}')
+        text.append(f'the best further effect, {best.hypothesis.effect.id}, gains '
+                    f'{best.gain:.1f} nats; on a robot that lacks nothing, a gain this large '
+                    f'has a probability of {last.chance:.2g}')
     return '; '.join(text) or 'nothing beyond noise'
 
 
@@ -166,18 +167,19 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
     worse = [name for name in plain if name in augmented
              and augmented[name] > (1.0 + setting('worse')) * plain[name]] if found.found else []
     if worse:
-        notes.append('predictions of data that were not fitted get worse with what was found: '
+        notes.append('held-out errors that grow with the finding: '
                      + ', '.join(f'{name} {plain[name]:.3g} to {augmented[name]:.3g}'
                                  for name in worse))
     most = setting('strained')
     strained = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.strain,
                                        strict=True) if abs(s) > most and u.kind == 'model']
     if strained:
-        notes.append(f'more than {most:g} tolerances from nominal: ' + ', '.join(strained)
-                     + '; check whether this model fits this robot')
+        notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(strained)
+                     + '; check that the model is one of this robot')
     values = found.evidence.noise.values
-    notes.append(f'floor and drivetrains disturb with {values["force"]:.2g} N, '
-                 f'{values["moment"]:.2g} N·m and {values["drive"]:.2g} N·m (estimated)')
+    notes.append(f'estimated random disturbances (standard deviation): force {values["force"]:.2g} '
+                 f'N, yaw moment {values["moment"]:.2g} N·m, torque on the wheels of each side '
+                 f'{values["drive"]:.2g} N·m')
     return tuple(notes)
 
 

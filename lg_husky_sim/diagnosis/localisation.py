@@ -214,7 +214,7 @@ def where_it_shows(evidence: Evidence, gain: FloatArray) -> str:
     rows = sorted(((sums[n] / counts[n], WORDS[n]) for n in WORDS if counts[n] > 20
                    and sums[n] > 0.15 * total and sums[n] / counts[n] > 1.3 * mean),
                   reverse=True)
-    return ', '.join(word for _, word in rows[:2]) or 'everywhere alike'
+    return ' and '.join(word for _, word in rows[:2]) or 'everywhere alike'
 
 
 def strengths(efforts: Sequence[Missing]) -> dict[str, float]:

@@ -13,8 +13,8 @@ from lg_husky_sim.diagnosis.diagnose import Case
 from lg_husky_sim.diagnosis.report_of_case import case_report
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Verdict
 from lg_husky_sim.husky.model_file import save_model
-from lg_husky_sim.reporting.data import Provenance
-from lg_husky_sim.reporting.words import quantity_with_unit
+from lg_husky_sim.reporting.data import Provenance, RECALIBRATED, WITH_FINDING
+from lg_husky_sim.reporting.words import plural, quantity_with_unit
 from lg_husky_sim.reporting.write import write_report
 
 #: File that marks a folder of this kind.
@@ -24,16 +24,19 @@ _ROWS = tuple((key, quantity_with_unit(key)) for key in (
     'max_abs_y_m'))
 
 
-def headline(diagnosis: Diagnosis) -> str:
-    """Return the answer in one sentence."""
+def headline(diagnosis: Diagnosis, changed: bool = False) -> str:
+    """Return the answer in one sentence; `changed` if the question was what changed."""
     match diagnosis.verdict:
         case Verdict.NOTHING_MISSING:
-            return 'Nothing is missing: the recalibrated model explains the recordings.'
+            return ('No change found: the model of the earlier recordings explains the later ones.'
+                    if changed else
+                    'No missing physics found: the recalibrated model explains the recordings.')
         case Verdict.UNKNOWN:
-            return 'Something is missing that is not in the catalogue.'
+            return ('Something has changed that is not in the catalogue.' if changed else
+                    'Something is missing that is not in the catalogue.')
         case Verdict.KNOWN:
-            count = len(diagnosis.findings)
-            return 'One effect is missing.' if count == 1 else f'{count} effects are missing.'
+            count = plural(len(diagnosis.findings), 'change' if changed else 'missing effect')
+            return f'{count} found.'
 
 
 def error_table(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
@@ -44,36 +47,36 @@ def error_table(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
             for key, label in _ROWS if any(key in c for c in columns)]
 
 
-def summary_text(diagnosis: Diagnosis) -> str:
+def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
     """
     Return the answer as text.
 
     Parameters
     ----------
     diagnosis : Diagnosis
+    changed : bool
+        Whether the question was what changed between recordings.
 
     Returns
     -------
     str
-        Headline, findings, rivals, what cannot be told apart, errors before and after.
+        Headline, findings, competing effects, what cannot be told apart, errors before and after.
     """
-    lines = [f'{headline(diagnosis)} (confidence {diagnosis.confidence:.2f})']
+    lines = [f'{headline(diagnosis, changed)} (confidence {diagnosis.confidence:.2f})']
     for finding in diagnosis.findings:
         lines.append(f'  {finding.effect}: {finding.statement}')
         evidence = f'gain {finding.held_out_gain:.0f} nats, {finding.chance}; ' if (
             finding.chance) else ''
         rivals = [f'{r.effect} {r.held_out_gain:.0f}' for r in finding.rivals
                   if r.held_out_gain > 0.0]
-        lines.append(f'    {evidence}rivals: '
-                     f'{", ".join(rivals) or "none that predicts better than nothing"}')
+        lines.append(f'    {evidence}competing effects: {", ".join(rivals) or "none with a gain"}')
     for group in diagnosis.indistinguishable:
-        lines.append(f'  not told apart: {", ".join(group.effects)}; '
-                     f'would tell: {"; ".join((*group.sensors, *group.manoeuvres))}')
-    lines.append(f'  {"error":22} {"plain":>10} {"augmented":>10}   held out: {"plain":>10} '
-                 f'{"augmented":>10}')
+        lines.append(f'  cannot be told apart: {", ".join(group.effects)}; '
+                     f'would separate them: {"; ".join((*group.sensors, *group.manoeuvres))}')
+    lines.append(f'  {"error on":22} {"all data:":>12} {"":>12}   {"held-out data:":>14}')
+    lines.append(f'  {"":22}' + f' {RECALIBRATED:>12} {WITH_FINDING:>12}  ' * 2)
     for label, *cells in error_table(diagnosis):
-        lines.append(f'  {label:22} {cells[0]:>10} {cells[1]:>10}             {cells[2]:>10} '
-                     f'{cells[3]:>10}')
+        lines.append(f'  {label:22} {cells[0]:>12} {cells[1]:>12}   {cells[2]:>12} {cells[3]:>12}')
     lines.append(f'  remaining: {diagnosis.remaining}')
     lines.extend(f'  note: {note}' for note in diagnosis.notes)
     return '\n'.join(lines)
@@ -101,7 +104,8 @@ def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,
     diagnosis = case.diagnosis
     save_model(diagnosis.model, folder / 'model.yaml')
     save_model(diagnosis.plain_model, folder / 'plain.yaml')
-    (folder / 'diagnosis.txt').write_text(summary_text(diagnosis) + '\n', encoding='utf-8')
+    (folder / 'diagnosis.txt').write_text(
+        summary_text(diagnosis, isinstance(case, ChangeCase)) + '\n', encoding='utf-8')
     (folder / MARKER).write_text(
         json.dumps(diagnosis_data(diagnosis), indent=1, ensure_ascii=False, allow_nan=False)
         + '\n', encoding='utf-8')

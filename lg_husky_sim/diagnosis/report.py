@@ -113,14 +113,14 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
     match diagnosis.verdict:
         case Verdict.NOTHING_MISSING:
             text = 'No change found' if changed else 'No missing physics found'
-            words = ('The robot of the earlier recordings explains the later ones.' if changed
+            words = ('The model of the earlier recordings explains the later ones.' if changed
                      else 'The recalibrated model explains the recordings.')
             return Headline(text, Tone.GOOD, (sure,), (words,), tuple(warnings))
         case Verdict.UNKNOWN:
             parts = ', '.join(dict.fromkeys(one.subsystem for one in found))
             text = 'Something has changed' if changed else 'Something is missing'
-            return Headline(f'{text} that is none of the known effects', Tone.BAD,
-                            (('Effect', 'none of the catalogue'),
+            return Headline(f'{text} that is not in the catalogue', Tone.BAD,
+                            (('Effect', 'not in the catalogue'),
                              ('Part of the robot', parts or '–'), sure),
                             sentences, tuple(warnings))
         case Verdict.KNOWN:
@@ -164,8 +164,8 @@ def losses(tables: Sequence[ErrorTable]) -> tuple[str, ...]:
             if after > before * (1.0 + setting('worse')):
                 worse.append(f'{row.name.split(" [")[0]} {change(before, after)}')
     return () if not worse else (
-        'On data that were not fitted, the model with the finding predicts worse than the '
-        f'recalibrated one: {", ".join(worse)}. Use `plain.yaml` where these count.',)
+        'On held-out data, the model with the finding predicts worse than the '
+        f'recalibrated one: {", ".join(worse)}. Use `plain.yaml` where these matter.',)
 
 
 def implausible(rows: Sequence[ParameterRow]) -> tuple[str, ...]:
@@ -174,8 +174,8 @@ def implausible(rows: Sequence[ParameterRow]) -> tuple[str, ...]:
     return () if not bound else (
         f'{len(bound)} of {plural(len(rows), "recalibrated parameter")} '
         f'{"is at its bound" if len(bound) == 1 else "are at their bounds"} '
-        f'({", ".join(bound)}): the recalibration is not plausible there, and what it could not '
-        'absorb may stand in the finding.',)
+        f'({", ".join(bound)}): the recalibration is implausible there, and what it could not '
+        'absorb may have ended up in the finding.',)
 
 
 def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple[Advice, ...]:
@@ -196,8 +196,8 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
     simulator: list[str] = []
     for finding in diagnosis.findings:
         if finding.effect == 'unknown':
-            robot.append('Look at the part that the report names, at the moments that it lists: '
-                         'no effect of the catalogue acts like this.')
+            robot.append('Check the part of the robot that the report names, at the times that it '
+                         'lists: no effect of the catalogue behaves like this.')
             continue
         values: dict[str, float | str] = {one.name: one.value for one in sizes(finding)}
         values |= {'side': finding.side, 'where': 'both sides', 'wheels': 'the wheels'}
@@ -218,9 +218,9 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
         names = ', '.join(name.replace('_', ' ') for name in group.effects)
         if tell:
             robot.append(f'Before repairing anything: these recordings cannot tell {names} apart. '
-                         f'What would: {tell}.')
+                         f'These would: {tell}.')
     simulator.append(
-        'Load the model of this diagnosis, which has all of it: `ros2 run lg_husky_sim sim_node '
+        'Load the model with the finding: `ros2 run lg_husky_sim sim_node '
         '--ros-args -p model:=model.yaml`.' if diagnosis.findings else
         'Load the recalibrated model: `ros2 run lg_husky_sim sim_node --ros-args -p '
         'model:=model.yaml`.')
@@ -246,10 +246,11 @@ def competing(diagnosis: Diagnosis) -> tuple[Section, ...]:
         near = max(finding.rivals, key=lambda r: r.held_out_gain)
         share = near.held_out_gain / finding.held_out_gain if finding.held_out_gain > 0.0 else 0.0
         if share > 0.0:
-            text.append(f'Next to {effect_words(finding)} comes '
-                        f'{near.effect.replace("_", " ")} with {100.0 * share:.0f} % of its gain.')
-    text.append('The gain is the logarithm of how many times more probable the recordings are '
-                'with the effect than without, everything else fitted again (1 nat: 2.7 times).')
+            text.append(f'Runner-up to {effect_words(finding)}: '
+                        f'{near.effect.replace("_", " ")}, with {100.0 * share:.0f} % of its '
+                        'gain.')
+    text.append('The gain is the log-likelihood ratio of the model with the effect to the one '
+                'without it, everything else refitted (1 nat is a factor of 2.7).')
     return (Section('Competing effects', tuple(text), tables=tuple(tables)),) if tables else ()
 
 

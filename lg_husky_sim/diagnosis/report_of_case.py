@@ -75,7 +75,7 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
         for stretch in _stretches(case.segments)]
     pair = (columns[-2], columns[-1])
     tables = [*_held_out(case, columns),
-              error_table('On all data', parts, columns, compared=pair)]
+              error_table('All data', parts, columns, compared=pair)]
     if len({s.recording for s in case.segments}) > 1:
         tables += [replace(table, title=f'Recording {table.title}', folded=True)
                    for table in recording_tables(parts, columns, pair)]
@@ -122,9 +122,9 @@ def _held_out(case: Case, columns: Sequence[str]) -> list[ErrorTable]:
         name: known[name][key] for name in columns if key in known[name]})
         for key in diagnosis.held_out_plain)
     return [ErrorTable(
-        'On data that were not fitted', rows, tuple(columns), True, (columns[-2], columns[-1]),
-        'Root mean square errors, driven by the commands alone; the nominal model is fitted to '
-        'none of the data, the others to the other half.')]
+        'Held-out data', rows, tuple(columns), True, (columns[-2], columns[-1]),
+        'Root mean square errors, driven by the commands alone. The nominal model is not fitted; '
+        'the others are fitted to the other half of the data.')]
 
 
 def _parameters(case: Case) -> list[ParameterRow]:
@@ -154,7 +154,7 @@ def _where(case: Case) -> tuple[Section, ...]:
     short = _short_names(*new_elements(plain, final))[1]
     named = ', '.join(f'{a} is {b}' for a, b in zip(short, added, strict=True))
     caption = 'The linear graph of the robot' + (
-        '; branches that the finding touches are red' if elements else '') + (
+        '; branches that the finding acts on are red' if elements else '') + (
         f', new ones dashed: {named}.' if added else '.')
     tables, charts = [], []
     if any(e.evidence > setting('unknown_evidence') for e in efforts):
@@ -164,20 +164,20 @@ def _where(case: Case) -> tuple[Section, ...]:
         charts = _efforts(efforts)
     terms = new_terms(diagnosis.model, plain)
     sections = [Section(
-        'Where in the model', text=('New in the equations:',) if terms else (),
+        'Where in the model', text=('New terms in the equations:',) if terms else (),
         verbatim='\n'.join(terms),
         drawings=(Drawing('graph', caption, lambda: _graph_figure(plain, final, elements)),))]
     if charts:
         sections.append(Section(
             'The missing effort', (
-                'A missing effort as a smoother sees it, without a guess of its law, and what it '
-                'goes with (band: two standard deviations).',), charts=tuple(charts)))
+                'The missing effort as a smoother estimates it, without assuming a law (band: two '
+                'standard deviations).',), charts=tuple(charts)))
     if tables:
         sections.append(Section(
             'Evidence against each part of the robot', (
-                'How well a smooth missing effort in each part alone would explain what the '
-                'recalibrated model leaves, relative to the best part. Parts that act through the '
-                'same balance are alike in this.',), tables=tuple(tables), folded=True))
+                'How well a smooth missing effort in each part alone would explain the residual '
+                'of the recalibrated model, relative to the best part. Parts that act through the '
+                'same balance get the same score.',), tables=tuple(tables), folded=True))
     return tuple(sections)
 
 

@@ -43,6 +43,7 @@ def effect_words(effect: Effect) -> str:
 def sentence(effect: Effect, onset: Onset | None, numbers: Sequence[Estimate], regime: str,
              changed: bool = False) -> str:
     """Return a finding in one plain sentence with numbers."""
-    text = (f'{"this has changed: " if changed else ""}{effect_words(effect)}'
-            f'{onset_words(onset)}: {in_words(numbers)}. It shows {regime}.')
+    mainly = '' if regime.startswith('everywhere') else 'mainly '
+    text = (f'{"changed: " if changed else ""}{effect_words(effect)}'
+            f'{onset_words(onset)}: {in_words(numbers)}. It shows {mainly}{regime}.')
     return text[0].upper() + text[1:]

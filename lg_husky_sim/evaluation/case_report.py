@@ -125,7 +125,7 @@ def verdict(result: CaseResult) -> list[str]:
             said.append(
                 f'Closest to the robot: {closer}. Robot and nominal engine obey one physics and '
                 f'differ in numbers alone ({changed}); the graph has simpler physics but was '
-                'calibrated on the circle. An engine that nobody calibrates is no reference: '
+                'calibrated on the circle. An uncalibrated engine is not a reference: '
                 'what it lacks is not physics but these numbers.')
         elif result.case.name == 'synthetic':
             said.append(

@@ -178,7 +178,7 @@ class _Reader(pickle._Unpickler):
     def _build(self) -> None:
         # Stand-ins get their state; functions and classes keep theirs.
         if not isinstance(self.stack[-2], (_Kept, _Block, _Dtype, _Array)):
-            raise RecordingError('the pickle changes something that is no table')
+            raise RecordingError('the pickle changes something that is not a table')
         _PLAIN[pickle.BUILD[0]](self)
 
     def _bytearray(self) -> None:

@@ -141,7 +141,7 @@ def _stamp(text: Any) -> int:
     except (ValueError, OverflowError, TypeError):
         stamp = -1
     if not 0 <= stamp < 2 ** 63:
-        raise RecordingError(f'ros_time {shown(text)} is no stamp in nanoseconds')
+        raise RecordingError(f'ros_time {shown(text)} is not a stamp in nanoseconds')
     return stamp
 
 

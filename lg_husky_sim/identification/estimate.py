@@ -253,7 +253,7 @@ def _warnings(solution: Solution, estimates: Sequence[Estimated], sure: Confiden
             said.append(f'not converged: {search.message}')
         return tuple(said)
     if not solution.converged:
-        said.append('not converged: the last step still lowered the cost; more steps are needed')
+        said.append('not converged: the last step still lowered the cost')
     if ends is not None and len(ends.all) > 1:
         said.extend(_disagreement(ends, sure))
     return tuple(said)
@@ -263,10 +263,9 @@ def _left_over(problem: Problem, solution: Solution) -> list[str]:
     data = problem.observations
     scaled = (data.measured - solution.predicted) * problem.metric.scale
     names = [name for name in data.channels if lingers(data, scaled, name)]
-    return [f'the residual of {", ".join(map(quantity, names))} is autocorrelated, as noise is '
-            'not: physics is missing from the model, and the intervals hold for this model '
-            'only; lg_husky diagnose looks for it'
-            ] if names else []
+    return [f'autocorrelated residuals ({", ".join(map(quantity, names))}): physics is missing '
+            'from the model, and the intervals hold only for this model; lg_husky diagnose finds '
+            'out what is missing'] if names else []
 
 
 def _disagreement(ends: Ends, sure: Confidence) -> list[str]:
@@ -284,6 +283,6 @@ def _disagreement(ends: Ends, sure: Confidence) -> list[str]:
         said.append(f'starts disagree: {len(equal)} ends fit equally well but differ in '
                     f'{", ".join(sorted(apart))}')
     if len(worse) * 2 > len(ends.all):
-        said.append(f'{len(worse)} of {len(ends.all)} starts ended in a worse minimum: the best '
-                    'one may not be the lowest either')
+        said.append(f'{len(worse)} of {len(ends.all)} starts ended in a worse local minimum, so '
+                    'the best one found may not be the global one')
     return said

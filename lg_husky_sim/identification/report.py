@@ -150,7 +150,7 @@ def report_data(result: FitResult, segments: Sequence[Segment], before: ModelFil
     parts: list[Predicted] = [
         (segment, {label: replay(plant, segment) for label, plant in plants.items()})
         for segment in segments]
-    residuals = ErrorTable('What was fitted', tuple(
+    residuals = ErrorTable('Residuals of the fit', tuple(
         ErrorRow(quantity_with_unit(one.name), {BEFORE: one.before, FITTED: one.after})
         for one in result.channels), columns, compared=columns, note=(
             'Root mean squares of what the fit minimises: the pose is set back to the measured '
@@ -159,7 +159,7 @@ def report_data(result: FitResult, segments: Sequence[Segment], before: ModelFil
     sections = [*_certainty(result), Section('As text', verbatim=str(result), folded=True)]
     return ReportData(
         f'Model fitted to {", ".join(result.recordings)}', _headline(result, replayed), columns,
-        ((BEFORE, 'the model as it was given'), (FITTED, 'with the estimates below')),
+        ((BEFORE, 'the model as it was given'), (FITTED, 'with the estimates above')),
         traces_of(parts, columns), (replayed, residuals), sections=tuple(sections),
         parameters=tuple(_parameter(one, result.model) for one in result.estimates),
         parameters_first=True,

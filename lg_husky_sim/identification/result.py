@@ -13,6 +13,7 @@ from typing import Any
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.profile import Profile
 from lg_husky_sim.identification.start_states import HEAD, StartState, summary
+from lg_husky_sim.reporting.words import plural, quantity
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -158,7 +159,8 @@ class FitResult:
 
     def __str__(self) -> str:
         """Return the report as text."""
-        lines = [f'Fit of {len(self.recordings)} recording(s): {", ".join(self.recordings)}',
+        lines = [f'Fit to {plural(len(self.recordings), "recording")}: '
+                 f'{", ".join(self.recordings)}',
                  f'method {self.method.value}, seed {self.seed}, {self.evaluations} simulations, '
                  f'{self.seconds:.2f} s, cost {self.cost:.6g}, '
                  f'{"converged" if self.converged else "NOT CONVERGED"}', '']
@@ -172,10 +174,11 @@ class FitResult:
                          f'{one.start:>11.5g}  {one.unit}{note}')
         if self.start_states:
             lines += ['', *_aligned([HEAD, *summary(self.start_states)])]
+        width = max([width, *(len(quantity(c.name)) for c in self.channels)])
         lines += ['', f'{"channel":<{width}}  {"values":>8}  {"RMS before":>11}  {"after":>11}  '
                       'unit']
-        lines += [f'{c.name:<{width}}  {c.count:>8}  {c.before:>11.4g}  {c.after:>11.4g}  {c.unit}'
-                  for c in self.channels]
+        lines += [f'{quantity(c.name):<{width}}  {c.count:>8}  {c.before:>11.4g}  '
+                  f'{c.after:>11.4g}  {c.unit}' for c in self.channels]
         pairs = [(abs(self.correlation[i, j]), i, j) for i in range(len(self.estimates))
                  for j in range(i) if abs(self.correlation[i, j]) >= SHOWN]
         if pairs:

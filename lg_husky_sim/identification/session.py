@@ -148,7 +148,7 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
         If ``out`` is a file, or two recordings would share a name.
     """
     if out.exists() and not out.is_dir():
-        raise SettingsError(f'{out} is no folder; --each needs one')
+        raise SettingsError(f'{out} is not a folder; --each needs one')
     names = [Path(path).name for path in paths]
     if len(set(names)) != len(names):
         raise SettingsError('two recordings have one name; --each writes a file for each')

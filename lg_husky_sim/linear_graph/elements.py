@@ -130,7 +130,7 @@ class Characteristic:
         object.__setattr__(self, 'parameters', tuple(self.parameters))
         for name in self.parameters:
             if not is_name(name):
-                raise GraphError(f'law {self.law!r}: {name!r} is no name of a parameter')
+                raise GraphError(f'law {self.law!r}: {name!r} is not a parameter name')
         unknown = set(names_in(self.expression)) - set(self.parameters) - set(self.arguments)
         if unknown:
             raise GraphError(
@@ -231,7 +231,7 @@ class Branch:
             return
         if self.kind in SOURCES:
             if self.value and not is_name(self.value):
-                raise GraphError(f'source {self.name!r}: input {self.value!r} is no plain name')
+                raise GraphError(f'source {self.name!r}: input {self.value!r} is not a plain name')
             return
         if not isinstance(self.value, str) or not self.value:
             raise GraphError(f'branch {self.name!r} has no value; {article(self.kind.value)} '

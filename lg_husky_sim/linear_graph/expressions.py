@@ -137,7 +137,7 @@ def _check(node: ast.expr, shown: str, depth: int) -> None:
         if node.id in FUNCTIONS:
             raise GraphError(f'expression {shown}: {node.id} is a function and needs an argument')
         if not is_name(node.id):
-            raise GraphError(f'expression {shown}: {node.id!r} is no plain name')
+            raise GraphError(f'expression {shown}: {node.id!r} is not a plain name')
         return
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         if node.func.id not in FUNCTIONS:

@@ -206,7 +206,7 @@ def _element(name: str, given: Any, values: dict[str, float], units: dict[str, s
         return two_port if law else replace(
             two_port, value=_value(entry, two_port, values, units))
     if what not in ELEMENTS:
-        raise ModelFileError(f'is: {what!r} is no element'
+        raise ModelFileError(f'is: {what!r} is not an element'
                              f'{suggestion(what, (*ELEMENTS, *two_ports))}')
     _known(entry, f'element {name!r}', ONE_PORT['properties'])
     kind, domain = ELEMENTS[what]

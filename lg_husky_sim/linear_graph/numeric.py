@@ -303,7 +303,7 @@ class NumericModel:
                 allowed = 'finite' if value.rule == 'any' else f'finite and {value.rule}'
                 return ParameterError(f'element {shown} = {number:g} is not allowed; '
                                       f'it must be {allowed}')
-        return ParameterError('the values of the elements are no single numbers')
+        return ParameterError('the values of the elements are not single numbers')
 
 
 __all__ = ['NumericModel', 'compile_numeric']

@@ -71,7 +71,7 @@ def _convert(node: ast.AST) -> Any:
         case ast.Call(func=ast.Name(id=name), args=[argument]):
             function = {'abs': 'Abs'}.get(name, name)
             return getattr(sympy, function)(_convert(argument))
-    raise GraphError(f'{ast.unparse(node)!r} is no expression')
+    raise GraphError(f'{ast.unparse(node)!r} is not an expression')
 
 
 class RationalField:

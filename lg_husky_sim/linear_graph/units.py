@@ -117,7 +117,7 @@ def _unit_of(node: ast.expr, shown: str) -> tuple[float, Dimension]:
         if prefix in _PREFIXES and unit in _UNITS and unit != '1':
             scale, dimension = _UNITS[unit]
             return _PREFIXES[prefix] * scale, dimension
-        raise GraphError(f'unit {shown}: {node.id!r} is no unit known here; there are '
+        raise GraphError(f'unit {shown}: {node.id!r} is not a known unit; known are '
                          f'{", ".join(_UNITS)} with the prefixes {", ".join(_PREFIXES)}')
     if number_of(node) == 1.0:
         return 1.0, PURE
@@ -273,4 +273,4 @@ def dimension_of(node: ast.expr, known: Mapping[str, Dimension]) -> Dimension:
                 raise GraphError(f'{name} needs a pure number, but {ast.unparse(argument)} has '
                                  'a unit')
             return PURE
-    raise GraphError(f'{ast.unparse(node)!r} is no expression')
+    raise GraphError(f'{ast.unparse(node)!r} is not an expression')

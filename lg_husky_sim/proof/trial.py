@@ -5,10 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import as_completed, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import as_completed, Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 import json
-import multiprocessing
 from pathlib import Path
 import shutil
 import signal
@@ -18,6 +17,7 @@ import time
 from typing import Any
 
 from lg_husky_sim.errors import CommandError, LgHuskyError, RecordingError
+from lg_husky_sim.identification.executor import processes
 from lg_husky_sim.proof import bags, measures, outcomes, plain
 from lg_husky_sim.proof.cases import generate, NoTraceError, Spec
 from lg_husky_sim.proof.sealing import unseal, write_json
@@ -148,14 +148,11 @@ def _made(folders: Folders, missing: Sequence[tuple[Spec, str]], jobs: int,
         for spec, name in missing:
             yield _generate(spec, name, folders, held_out)
         return
-    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context('spawn'))
-    try:
+    with processes(jobs) as pool:
         waiting = [pool.submit(_generate, spec, name, folders, held_out)
                    for spec, name in missing]
         for future in as_completed(waiting):
             yield future.result()
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def command_for(folders: Folders, name: str, out: Path, told: Mapping[str, Any]) -> list[str]:

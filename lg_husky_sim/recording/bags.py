@@ -148,11 +148,12 @@ def _files(path: Path) -> list[Path]:
         if len({part.suffix for part in parts}) == 1:
             return parts
         raise RecordingError(
-            f'{path} is no recording: a rosbag2 folder holds metadata.yaml or files of one kind '
-            f'of {", ".join(SUFFIXES)}')
+            f'{path} is not a recording: a rosbag2 folder holds metadata.yaml or files of one '
+            f'kind of {", ".join(SUFFIXES)}')
     if path.suffix not in SUFFIXES:
         raise RecordingError(
-            f'{path} is no recording: a rosbag2 folder or a file {", ".join(SUFFIXES)} is')
+            f'{path} is not a recording: it is neither a rosbag2 folder nor a file '
+            f'{", ".join(SUFFIXES)}')
     return [path]
 
 

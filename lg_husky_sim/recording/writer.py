@@ -159,7 +159,7 @@ def check_target(path: Path, *, overwrite: bool = False) -> None:
         raise RecordingError(f'{path} exists already; choose another name, or allow it to '
                              'be replaced (--overwrite, overwrite=True)')
     if not (path.is_dir() and (path / 'metadata.yaml').is_file()):
-        raise RecordingError(f'{path} exists and is no rosbag2; it is not overwritten')
+        raise RecordingError(f'{path} exists and is not a rosbag2, so it is not overwritten')
 
 
 def _write(path: Path, makers: Callable[[Typestore], list[Maker]], storage: str, start_ns: int

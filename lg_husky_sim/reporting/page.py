@@ -49,6 +49,12 @@ def code(text: str) -> Markup:
         for place, part in enumerate(parts))
 
 
+def breakable(name: str) -> Markup:
+    """Return a name as it is typed, which a narrow column may break behind an underscore."""
+    from markupsafe import escape, Markup
+    return Markup('_<wbr>').join(escape(part) for part in name.split('_'))
+
+
 def worded(table: Table) -> list[bool]:
     """Return which columns of a table hold words and stand to the left."""
     columns = [[one.text if isinstance(one, Cell) else one for one in column]
@@ -100,8 +106,7 @@ def _change_cell(known: Mapping[str, float], compared: tuple[str, str], low: flo
         words += f' ({change(1.0, low)} to {change(1.0, high)})'
     # A change that is rounded away, or whose interval includes none, is neither.
     if not (math.isfinite(before) and math.isfinite(after)) or low < 1.0 < high or (
-            round(100.0 * after) == round(100.0 * before)
-            and number(before) == number(after)):
+            abs(after - before) < 0.005 * before):
         return Cell(words)
     if after > before:
         return Cell(f'{words} worse', tone=Tone.BAD)
@@ -129,7 +134,7 @@ def _parameter(one: ParameterRow) -> dict[str, Any]:
                   'words': f'{number(one.value)} within {number(one.least)} to '
                            f'{number(one.most)}'}
     moved = 100.0 * (one.value / one.nominal - 1.0) if one.nominal else math.nan
-    return {'name': one.name.replace('_', ' '), 'nominal': number(one.nominal, 4),
+    return {'name': breakable(one.name), 'nominal': number(one.nominal, 4),
             'value': number(one.value, 4), 'interval': interval,
             'unit': '' if one.unit == '1' else one.unit, 'at_bound': one.at_bound,
             'change': f'{moved:+.1f} %'.replace('-', '−') if math.isfinite(moved) else '–',

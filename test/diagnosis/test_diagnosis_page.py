@@ -53,8 +53,8 @@ def test_the_first_line_names_effect_and_side() -> None:
 @pytest.mark.parametrize(('verdict', 'changed', 'text', 'tone'), [
     (Verdict.NOTHING_MISSING, False, 'No missing physics found', Tone.GOOD),
     (Verdict.NOTHING_MISSING, True, 'No change found', Tone.GOOD),
-    (Verdict.UNKNOWN, False, 'Something is missing that is none of the known effects', Tone.BAD),
-    (Verdict.UNKNOWN, True, 'Something has changed that is none of the known effects', Tone.BAD),
+    (Verdict.UNKNOWN, False, 'Something is missing that is not in the catalogue', Tone.BAD),
+    (Verdict.UNKNOWN, True, 'Something has changed that is not in the catalogue', Tone.BAD),
     (Verdict.KNOWN, True, 'What changed: torque ripple, left side', Tone.FOUND)])
 def test_the_first_line_answers_the_question(verdict: Verdict, changed: bool, text: str,
                                              tone: Tone) -> None:
@@ -95,5 +95,5 @@ def test_parameters_at_their_bounds_are_called_implausible() -> None:
             ParameterRow('mass', 'kg', 48.0, 50.0)]
     (warning,) = implausible(rows)
     assert warning.startswith(
-        '1 of 2 recalibrated parameters is at its bound (wheel damping): the recalibration is not')
+        '1 of 2 recalibrated parameters is at its bound (wheel damping): the recalibration is')
     assert implausible(rows[1:]) == ()

@@ -222,7 +222,7 @@ def test_a_stamp_that_is_none_is_shown(
     columns = raw()
     columns['ros_time'][100] = stamp
     path = write(pandas, tmp_path / 'raw_dataframe.pkl', columns)
-    with pytest.raises(RecordingError, match='is no stamp in nanoseconds'):
+    with pytest.raises(RecordingError, match='is not a stamp in nanoseconds'):
         read_drive(path)
 
 

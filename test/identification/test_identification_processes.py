@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+import re
 import signal
 import subprocess
 import sys
@@ -72,6 +73,15 @@ def test_no_process_outlives_the_one_who_asked(number: signal.Signals, tmp_path:
         assert not child.exists()
     assert said == 'interrupted\n' * (number is signal.SIGINT)
     assert 'Traceback' not in errors
+
+
+def test_all_processes_of_the_package_are_of_this_kind() -> None:
+    """Also those of `prove`: no other module makes a pool, whose processes would go on."""
+    package = Path(__file__).resolve().parents[2] / 'lg_husky_sim'
+    makers = {path.name for path in package.rglob('*.py') if re.search(
+        r'(ProcessPoolExecutor|multiprocessing\.(Pool|Process))\(',
+        path.read_text(encoding='utf-8'))}
+    assert makers == {'executor.py'}
 
 
 def test_a_cluster_named_by_the_environment_takes_the_tasks_and_may_lose_a_worker(

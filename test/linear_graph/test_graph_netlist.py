@@ -80,7 +80,7 @@ def test_forms_and_grounds() -> None:
 
 
 @pytest.mark.parametrize(('old', 'new', 'message'), [
-    ('inertia', 'inertai', r"element 'J': is: 'inertai' is no element; did you mean 'inertia'"),
+    ('inertia', 'inertai', r"element 'J': is: 'inertai' is not an element; did you mean 'iner"),
     ('value: k_t', 'value: k_tt', r"parameter 'k_t' is used by no element; did you mean 'k_tt'"),
     ('N·m/A', 'rad/(N·m·s)', r"unit of 'motor': k_t with k_t .* does not fit a transformer"),
     ('2 mH', '2 mF', r"unit of 'L': L with L \[mF\] does not fit an electrical T-type"),
@@ -90,7 +90,7 @@ def test_forms_and_grounds() -> None:
     ('0.5 ohm', '0.5*', r"branch 'R': expression '0.5\*' cannot be read"),
     ('value: 0.5', 'valeu: 0.5', r"element 'R': unknown key 'valeu'; did you mean 'value'"),
     ('from: motor}', 'from: motr}', r"node 'motor' has no branch but 'L'|node 'motr' has"),
-    ('0.5 ohm', '0.5 bar', r"element 'R': unit 'bar': 'bar' is no unit known here"),
+    ('0.5 ohm', '0.5 bar', r"element 'R': unit 'bar': 'bar' is not a known unit"),
     ('0.5 ohm', '[1, 2]', r"element 'R': value must be a number with a unit"),
     ('0.5 ohm', '.inf', r"element 'R': value = inf must be a number with a unit"),
     ('  J:', '  R:', r'not YAML: R is given twice in line \d+'),

@@ -245,9 +245,9 @@ def test_what_is_no_bag(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match='no such file or folder'):
         read_recording(tmp_path / 'nowhere')
     (tmp_path / 'notes.txt').write_text('hello')
-    with pytest.raises(RecordingError, match=r'notes.txt is no recording'):
+    with pytest.raises(RecordingError, match=r'notes.txt is not a recording'):
         read_recording(tmp_path / 'notes.txt')
-    with pytest.raises(RecordingError, match='is no recording: a rosbag2 folder holds'):
+    with pytest.raises(RecordingError, match='is not a recording: a rosbag2 folder holds'):
         read_recording(tmp_path)
     (tmp_path / 'bad.mcap').write_bytes(b'')
     with pytest.raises(RecordingError, match=r'cannot read .*bad.mcap: .*empty'):

@@ -77,7 +77,7 @@ def test_nothing_is_overwritten_unless_asked_and_a_bag(tmp_path: Path) -> None:
     precious = tmp_path / 'precious'
     precious.mkdir()
     (precious / 'thesis.txt').write_text('mine')
-    with pytest.raises(RecordingError, match='precious exists and is no rosbag2'):
+    with pytest.raises(RecordingError, match='precious exists and is not a rosbag2'):
         write_recording(precious, _streams(5), overwrite=True)
     assert (precious / 'thesis.txt').read_text() == 'mine'
 

@@ -68,8 +68,8 @@ def finding(decision: Decision, settings: Settings, p_value: float, share: float
         return Finding('unknown', 'none', near.subsystem if near else 'drivetrain',
                        near.elements if near else (), near.regime if near else '', None, (),
                        decision.unnamed, p_value, share, rivals,
-                       'Something changed that is none of the known changes: the later recordings '
-                       'are fitted by another robot than the earlier ones.')
+                       'Something has changed that is none of the known changes: the later '
+                       'recordings need other parameters than the earlier ones.')
     if named is None:
         return None
     change = named.change

@@ -188,13 +188,12 @@ def _share(decision: Decision, body: Block | None, loop: Block, after: Sequence[
 def _remaining(decision: Decision) -> str:
     if decision.named is None:
         best = decision.rivals[0] if decision.rivals else None
-        return 'no change gains' if best is None or best.gain <= 0.0 else (
-            f'the best change would be {best.change.effect} with a gain of {best.gain:.1f} nats, '
-            'which is not enough to claim it')
+        return 'no change has a gain' if best is None or best.gain <= 0.0 else (
+            f'the best change, {best.change.effect}, gains {best.gain:.1f} nats, too little to '
+            'adopt it')
     others = [one for one in decision.rivals if one.gain > 0.0]
-    return 'no other change gains' if not others else (
-        f'the next name is {others[0].change.effect} with a gain of {others[0].gain:.0f} nats '
-        'in place of the one given')
+    return 'no other change has a gain' if not others else (
+        f'the runner-up, {others[0].change.effect}, would gain {others[0].gain:.0f} nats instead')
 
 
 def _notes(recordings: Sequence[Recording]) -> tuple[str, ...]:

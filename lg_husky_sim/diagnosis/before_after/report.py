@@ -61,9 +61,9 @@ def change_report(case: ChangeCase, provenance: Provenance | None = None) -> Rep
         name: known[name][key] for name in columns if key in known[name]})
         for key in diagnosis.held_out_plain)
     tables = [
-        ErrorTable('On later recordings that were not fitted', rows, columns, True, pair,
+        ErrorTable('Held-out later recordings', rows, columns, True, pair,
                    'Root mean square errors, driven by the commands alone.'),
-        replace(error_table('On all later recordings', parts, columns, compared=pair))]
+        replace(error_table('All later recordings', parts, columns, compared=pair))]
     if len({s.recording for s in case.segments}) > 1:
         tables += [replace(table, title=f'Recording {table.title}', folded=True)
                    for table in recording_tables(parts, columns, pair)]
@@ -84,7 +84,7 @@ def _both_fits(case: ChangeCase) -> Section:
                  base.values(case.loop.after), strict=True)
     rows = tuple((q.meaning, number(float(before), 4), number(float(after), 4),
                   '' if q.unit == '1' else q.unit) for q, before, after in values)
-    return Section('The base robot, fitted to either set alone', (
-        'What these fits differ in is partly what the recordings leave open; the finding is what '
-        'must differ if all else is the same.',), tables=(
+    return Section('The base robot, fitted to each set alone', (
+        'Part of the difference between these fits is what the recordings leave undetermined; the '
+        'finding is what must differ if everything else stays the same.',), tables=(
         Table(('quantity', 'before', 'after', 'unit'), rows),), folded=True)
