@@ -177,7 +177,7 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
         notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(strained)
                      + '; check that the model is one of this robot')
     values = found.evidence.noise.values
-    notes.append(f'estimated random disturbances (standard deviation): force {values["force"]:.2g} '
+    notes.append(f'estimated disturbances (standard deviation): force {values["force"]:.2g} '
                  f'N, yaw moment {values["moment"]:.2g} N·m, torque on the wheels of each side '
                  f'{values["drive"]:.2g} N·m')
     return tuple(notes)

@@ -10,7 +10,7 @@ import math
 from lg_husky_sim.diagnosis.before_after.settings import settings as before_after
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.effects import effect_kind, Onset, OnsetKind
+from lg_husky_sim.husky.effects import catalogue, effect_kind, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.data import (
     Advice,
@@ -127,19 +127,23 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
             what = '; '.join(effect_words(one) for one in found)
             noun = 'What changed' if changed else (
                 'Missing effect found' if len(found) == 1 else 'Missing effects found')
-            facts = tuple(fact for one in found for fact in _facts(one, len(found) > 1))
+            facts = tuple(fact for one in found for fact in _facts(
+                one, len(found) > 1, changed))
             return Headline(f'{noun}: {what}', Tone.FOUND, (*facts, sure),
                             sentences, tuple(warnings))
 
 
-def _facts(finding: Finding, several: bool) -> tuple[tuple[str, str], ...]:
+def _facts(finding: Finding, several: bool, changed: bool) -> tuple[tuple[str, str], ...]:
     # The phase of a ripple says where on the wheel, not how large.
     words = '; '.join(size_words(one) for one in sizes(finding) if one.name != _PHASE) or '–'
     if several:
         return ((f'Size of {effect_words(finding)}', words),)
-    side = finding.side if finding.side in ('left', 'right', 'both') else 'whole robot'
-    return (('Effect', finding.effect.replace('_', ' ')), ('Side', side), ('Size', words),
-            ('Acts', onset_words(finding.onset)))
+    kind = catalogue().get(finding.effect)
+    sided = kind is not None and set(kind.sides) & {'left', 'right', 'both'}
+    return (('Effect', finding.effect.replace('_', ' ')),
+            ('Side', finding.side if sided and finding.side != 'none' else 'whole robot'),
+            ('Size', words),
+            ('Acts', 'in the later recordings' if changed else onset_words(finding.onset)))
 
 
 def losses(tables: Sequence[ErrorTable]) -> tuple[str, ...]:
@@ -317,7 +321,7 @@ def report_data(
     notes = (*diagnosis.notes, *((f'What remains: {diagnosis.remaining}.',)
                                  if diagnosis.remaining else ()))
     return ReportData(
-        f'Diagnosis of {", ".join(recordings)}',
+        f'{"What changed in " if changed else "Diagnosis of "}{", ".join(recordings)}',
         headline(diagnosis, (*losses(errors), *implausible(parameters)), changed=changed), columns,
         tuple((name, about[name]) for name in columns), tuple(traces), tuple(errors),
         advice(diagnosis, shapes or {}), view,

@@ -6,9 +6,12 @@ from __future__ import annotations
 
 import math
 
+from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.report import advice, headline, implausible, losses, sizes
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
+from lg_husky_sim.husky.effects import catalogue
 from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.reporting.advice import names_in
 from lg_husky_sim.reporting.data import (
     ErrorRow,
     ErrorTable,
@@ -48,6 +51,25 @@ def test_the_first_line_names_effect_and_side() -> None:
     assert dict(said.facts) == {
         'Effect': 'torque ripple', 'Side': 'left', 'Size': 'amplitude 5 N·m (4.8 to 5.2)',
         'Acts': 'always', 'Confidence': '93 %'}
+
+
+def test_a_change_of_the_floor_has_no_side_and_its_numbers_no_other_unit() -> None:
+    """Before and after, a slope is in m/s²; the catalogue has it in N."""
+    slope = _finding('slope', 'both', Estimate('slope_x', -0.345, 'm/s²', -0.362, -0.329))
+    diagnosis = _diagnosis(Verdict.KNOWN, slope)
+    facts = dict(headline(diagnosis, changed=True).facts)
+    assert (facts['Side'], facts['Acts']) == ('whole robot', 'in the later recordings')
+    robot = advice(diagnosis, {})[0].sentences
+    assert any('level floor' in line for line in robot)
+    assert not any('0.345' in line for line in robot)
+
+
+def test_advice_takes_numbers_of_before_and_after_in_their_unit_only() -> None:
+    others = {one.name: one.unit for one in settings().quantities}
+    for kind in catalogue().values():
+        said = names_in(' '.join((*kind.advice.robot, *kind.advice.simulator)))
+        for one in kind.parameters:
+            assert one.name not in said or others.get(one.name, one.unit) == one.unit, one.name
 
 
 @pytest.mark.parametrize(('verdict', 'changed', 'text', 'tone'), [

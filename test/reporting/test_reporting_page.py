@@ -149,10 +149,11 @@ def test_a_loss_is_as_visible_as_a_gain() -> None:
         ErrorRow('yaw rate [rad/s]', {NOMINAL: 0.4, RECALIBRATED: 0.2, WITH_FINDING: 0.1}),
         ErrorRow('heading [rad]', {NOMINAL: 0.4, RECALIBRATED: 0.2, WITH_FINDING: 0.2}),
         ErrorRow('wheel rate [rad/s]', {RECALIBRATED: 0.2, WITH_FINDING: 0.21}, 0.9, 1.2),
+        ErrorRow('forward speed [m/s]', {RECALIBRATED: 0.8802, WITH_FINDING: 0.8809}),
     ), COLUMNS, compared=(RECALIBRATED, WITH_FINDING))
     assert _changes(table) == [
         ('+100\u00a0% worse', Tone.BAD), ('−50\u00a0%', Tone.GOOD), ('+0\u00a0%', Tone.PLAIN),
-        ('+5\u00a0% (−10\u00a0% to +20\u00a0%)', Tone.PLAIN)]
+        ('+5\u00a0% (−10\u00a0% to +20\u00a0%)', Tone.PLAIN), ('+0\u00a0%', Tone.PLAIN)]
 
 
 def test_models_side_by_side_have_their_best_marked() -> None:
@@ -174,6 +175,8 @@ def test_a_parameter_is_drawn_within_what_the_fit_allows() -> None:
     assert edge['at_bound']
     assert float(edge['left']) + float(edge['width']) == 100.0  # cut off, not drawn beside it
     assert not free['drawn']
+    (typed,) = parameter_rows([ParameterRow('wheel_damping', '1', 1.0, 2.0)])
+    assert typed['name'] == 'wheel_<wbr>damping'
     assert free['interval'] == '–'
 
 
