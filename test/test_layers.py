@@ -14,7 +14,8 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'lg_husky_sim'
 MAX_LINES = 400
 
-BASE = {'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'resources', 'signals', 'yaml_files'}
+BASE = {'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'processes', 'resources', 'signals',
+        'yaml_files'}
 MODEL = {'linear_graph', 'husky', 'simulation'}
 DATA = MODEL | {'recording', 'comparison', 'reporting'}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -25,6 +26,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'folders': {'errors'},
     'yaml_files': {'errors'},
     'jit': {'errors', 'extras'},
+    'processes': set(),
     'manoeuvres': {'errors', 'signals', 'resources', 'yaml_files'},
     'linear_graph': set(),
     'husky': {'linear_graph'},

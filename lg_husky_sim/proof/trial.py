@@ -17,7 +17,7 @@ import time
 from typing import Any
 
 from lg_husky_sim.errors import CommandError, LgHuskyError, RecordingError
-from lg_husky_sim.identification.executor import processes
+from lg_husky_sim.processes import processes
 from lg_husky_sim.proof import bags, measures, outcomes, plain
 from lg_husky_sim.proof.cases import generate, NoTraceError, Spec
 from lg_husky_sim.proof.sealing import unseal, write_json

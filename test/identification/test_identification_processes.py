@@ -15,7 +15,7 @@ import pytest
 
 PROGRAM = """
 import os, signal, time
-from lg_husky_sim.identification.executor import processes
+from lg_husky_sim.processes import processes
 if __name__ == '__main__':
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
@@ -81,7 +81,7 @@ def test_all_processes_of_the_package_are_of_this_kind() -> None:
     makers = {path.name for path in package.rglob('*.py') if re.search(
         r'(ProcessPoolExecutor|multiprocessing\.(Pool|Process))\(',
         path.read_text(encoding='utf-8'))}
-    assert makers == {'executor.py'}
+    assert makers == {'processes.py'}
 
 
 def test_a_cluster_named_by_the_environment_takes_the_tasks_and_may_lose_a_worker(
