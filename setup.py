@@ -16,7 +16,7 @@ DATA_FOLDERS = [folder for folder in ('config', 'urdf') if (ROOT / folder).is_di
 SHARE_FOLDERS = [*DATA_FOLDERS, *(folder for folder in ('launch',) if (ROOT / folder).is_dir())]
 
 EXTRAS = {
-    'fast': ['numba>=0.59'],
+    'fast': ['numba>=0.59', 'threadpoolctl>=3.1'],
     'plot': ['matplotlib>=3.6'],
     'bags': ['rosbags>=0.11'],
     # cyclonedds ships no wheel for Linux on ARM and none after Python 3.13.

@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'lg_husky_sim'
 MAX_LINES = 400
 
-BASE = {'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'processes', 'resources', 'signals',
-        'yaml_files'}
+BASE = {'blas', 'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'processes', 'resources',
+        'signals', 'yaml_files'}
 MODEL = {'linear_graph', 'husky', 'simulation'}
 DATA = MODEL | {'recording', 'comparison', 'reporting'}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -25,6 +25,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'extras': {'errors'},
     'folders': {'errors'},
     'yaml_files': {'errors'},
+    'blas': set(),
     'jit': {'errors', 'extras'},
     'processes': set(),
     'manoeuvres': {'errors', 'signals', 'resources', 'yaml_files'},
@@ -56,7 +57,7 @@ rosbags, and proof writes bags with code of its own, as the blind trial shares n
 
 ONLY_INSIDE_FUNCTIONS = {'sympy', 'matplotlib', 'mujoco', 'pybullet', 'dask', 'distributed',
                          'rosbags', 'cyclonedds', 'jinja2', 'pandas', 'control', 'plotly',
-                         'PIL'}
+                         'PIL', 'threadpoolctl'}
 """Slow to import or optional: the package imports without them. The
 backends of ros are chosen at run time, each in files of its own that import what they need."""
 

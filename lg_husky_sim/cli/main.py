@@ -14,6 +14,7 @@ import traceback
 from typing import Any
 
 import click
+from lg_husky_sim.blas import set_one_thread
 from lg_husky_sim.errors import LgHuskyError
 
 MISUSED = 2
@@ -110,6 +111,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         cannot be understood (one line on standard error says what), 130 interrupted.
 
     """
+    set_one_thread()
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = cli.main(given or ['--help'], prog_name='lg_husky', standalone_mode=False)

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from lg_husky_sim.diagnosis.decision import confidence
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort
-from lg_husky_sim.diagnosis.localisation import where_it_shows
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, Effort
+from lg_husky_sim.diagnosis.localisation import Missing, where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
 from lg_husky_sim.diagnosis.selection.rounds import Round, Tried
 from lg_husky_sim.diagnosis.selection.search import Search
@@ -154,7 +154,7 @@ class Answer:
     features: confidence.Features
 
 
-def answer(search: Search, rest: Sequence[Effort]) -> Answer:
+def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> Answer:
     """
     Decide between the names, unknown and nothing.
 
@@ -163,12 +163,14 @@ def answer(search: Search, rest: Sequence[Effort]) -> Answer:
     search : Search
     rest : sequence of Effort
         Smooth efforts in what the search leaves, largest evidence first.
+    free : sequence of Missing
+        Efforts over time in what it leaves.
 
     Returns
     -------
     Answer
     """
-    left = max(rest[0].evidence, 0.0) if rest else 0.0
+    left = max([0.0, *(e.evidence for e in rest[:1]), *(m.evidence for m in free)])
     first = search.rounds[0]
     tried = first.tried
     if not search.adopted:
@@ -181,7 +183,7 @@ def answer(search: Search, rest: Sequence[Effort]) -> Answer:
     others = [t.gain for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id]
     second = max([0.0, *others])
     features = confidence.Features(best.gain, 1.0 - second / max(best.gain, 1e-9),
-                                   left / max(_explained(search), 1e-9), first.chance)
+                                   left / max(_explained(search), best.gain), first.chance)
     if left > setting('unknown_evidence') and features.share > setting('unknown_share'):
         return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
     return Answer(Verdict.KNOWN, confidence.of_name(features), features)
@@ -193,20 +195,23 @@ def _explained(search: Search) -> float:
     return evidence.cost(evidence.residuals(plain.predicted), plain.point) - search.final.cost
 
 
-def unknown_finding(search: Search, rest: Sequence[Effort]) -> Finding:
-    """Return what is missing without a name, by its best smooth description."""
-    first = rest[0]
+def unknown_finding(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> Finding:
+    """Return what is missing without a name, by its best description."""
+    smooth, bursts = rest[0], max(free, key=lambda one: one.evidence)
+    is_smooth = smooth.evidence >= bursts.evidence
+    balance = smooth.balance if is_smooth else bursts.balance
     where = {'force': 'a force on the chassis', 'moment': 'a moment on the chassis',
              'torque_left': 'a torque on the left wheels',
-             'torque_right': 'a torque on the right wheels'}[first.balance]
-    largest = float(np.max(np.abs(first.values), initial=0.0))
-    unit = 'N' if first.balance == 'force' else 'N·m'
-    text = (f'No effect of the catalogue explains it; it is best described as {where}, a smooth '
-            f'function of {first.argument.replace("_", " ")}, up to {largest:.3g} {unit}.')
-    side = {'torque_left': 'left', 'torque_right': 'right'}.get(first.balance, 'none')
+             'torque_right': 'a torque on the right wheels'}[balance]
+    parts = [smooth.values] if is_smooth else [m.values for m in free if m.balance == balance]
+    largest = max(float(np.max(np.abs(one), initial=0.0)) for one in parts)
+    _, _, side, subsystem, unit = BALANCES[balance]
+    regime = smooth.argument.replace('_', ' ') if is_smooth else 'scattered moments'
+    how = f', a smooth function of {regime}' if is_smooth else f' at {regime}'
+    text = (f'No effect of the catalogue explains it; it is best described as {where}{how}, '
+            f'up to {largest:.3g} {unit}.')
     elements = {'force': ('M_H',), 'moment': ('J_H',), 'torque_left': ('J_LW',),
-                'torque_right': ('J_RW',)}[first.balance]
-    one = search.rounds[0]
-    rivals = rivals_of(replace(one, adopted=False))
-    return Finding('unknown', side, first.subsystem, elements, first.argument.replace('_', ' '),
-                   None, (), first.evidence, float('nan'), 1.0, rivals, text)
+                'torque_right': ('J_RW',)}[balance]
+    rivals = rivals_of(replace(search.rounds[0], adopted=False))
+    return Finding('unknown', side, subsystem, elements, regime, None, (),
+                   max(smooth.evidence, bursts.evidence), float('nan'), 1.0, rivals, text)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 
+from lg_husky_sim.blas import one_thread
 from lg_husky_sim.diagnosis.conclusion import (
     answer,
     estimates,
@@ -23,7 +24,7 @@ from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts
-from lg_husky_sim.diagnosis.localisation import mismatches
+from lg_husky_sim.diagnosis.localisation import mismatches, Missing, missing_efforts
 from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
 from lg_husky_sim.diagnosis.settings import setting
@@ -86,7 +87,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     recordings, _ = named_apart(recordings, ())
     drives = drives_of(recordings)
     names = [r.name for r in recordings]
-    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+    with one_thread(), ThreadPoolExecutor(max(jobs, 1)) as pool:
         start = beginning(nominal.structure, base_unknowns(nominal.parameters, drives),
                           nominal.parameters, Reading())
         progress('noise', 0.02)
@@ -94,21 +95,22 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         found = search(evidence, start, progress)
         progress('smooth efforts', 0.85)
         rest = efforts(found.evidence, found.final)
+        free = missing_efforts(found.evidence, found.final)
         progress('numbers', 0.9)
         parts = tuple(s for r in recordings for s in segments(r))
-        said, features = _diagnosis(found, rest, parts, nominal)
+        said, features = _diagnosis(found, rest, free, parts, nominal)
     notes = (*said.notes, *_mended(recordings))
     return Case(replace(said, notes=notes), found, parts, nominal, rest, features)
 
 
-def _diagnosis(found: Search, rest: Sequence[Effort], parts: Sequence[Segment],
-               nominal: ModelFile) -> tuple[Diagnosis, Features]:
-    said = answer(found, rest)
+def _diagnosis(found: Search, rest: Sequence[Effort], free: Sequence[Missing],
+               parts: Sequence[Segment], nominal: ModelFile) -> tuple[Diagnosis, Features]:
+    said = answer(found, rest, free)
     match said.verdict:
         case Verdict.KNOWN:
             names = findings(found)
         case Verdict.UNKNOWN:
-            names = (unknown_finding(found, rest),)
+            names = (unknown_finding(found, rest, free),)
         case Verdict.NOTHING_MISSING:
             names = ()
     culprit = names[0].subsystem if names else None

@@ -16,6 +16,7 @@ from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import probe_times
 from lg_husky_sim.diagnosis.evidence.whitener import respond
+from lg_husky_sim.diagnosis.hypotheses.bursts import burst_evidence
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, hats, log_evidence
 from lg_husky_sim.diagnosis.result import Mismatch
 from lg_husky_sim.diagnosis.selection.screening import Projection
@@ -49,7 +50,8 @@ class Missing:
     times, values, deviations : numpy.ndarray, shape (n,)
         [s], mean and standard deviation [unit of the balance].
     evidence : float
-        Log evidence of the balance over all drives [nats].
+        Log evidence of the balance over all drives [nats]: of an effort of one size all the
+        time, or of one that bursts.
     """
 
     balance: str
@@ -98,7 +100,11 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
         for size, (_, block) in zip(sizes, blocks, strict=True):
             columns[top:top + block.shape[0], first:first + size] = block
             first, top = first + size, top + block.shape[0]
-        gain, values, deviations = log_evidence(projection.apply(columns), projection.target)
+        normal, slope = projection.problem(columns)
+        gain, values, deviations = log_evidence(normal, slope)
+        if BALANCES[balance][2] == 'none':
+            # Those of the wheels burst with every command that comes a little late.
+            gain = max(gain, burst_evidence(slope / np.sqrt(np.maximum(np.diag(normal), 1e-12))))
         first = 0
         for size, drive in zip(sizes, evidence.drives, strict=True):
             part = slice(first, first + size)

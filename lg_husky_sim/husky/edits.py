@@ -186,7 +186,8 @@ def _drivetrain(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         number, side = ('1', 0.0) if letter == 'L' else ('2', 1.0)
         rate = f'omega({inertia.name})'
         rows: dict[str, tuple[Law, tuple[Coefficient, ...], tuple[str, ...]]] = {
-            'coulomb_drivetrain': (Law.COULOMB, ('dry_torque', 'dry_speed', 0.0, 1.0), (rate,)),
+            'coulomb_drivetrain': (Law.COULOMB, ('dry_torque', 'dry_speed', 'breakaway_share',
+                                                 'breakaway_speed'), (rate,)),
             'torque_ripple': (Law.WHEEL_PHASE,
                               ('ripple_cos', 'ripple_sin', side, 'ripple_speed'), (rate,)),
             'gear_backlash': (Law.BACKLASH, ('play', 'torque_constant*gear_ratio', side),

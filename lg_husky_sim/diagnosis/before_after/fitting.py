@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeVar
 
+from lg_husky_sim.blas import one_thread
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.prediction import Base, jacobian, residual
 from lg_husky_sim.diagnosis.before_after.whitening import Noise
@@ -26,7 +27,7 @@ Mapper = Callable[[Callable[[Task], Outcome], Iterable[Task]], Iterable[Outcome]
 @contextmanager
 def threads(jobs: int) -> Iterator[ThreadPoolExecutor]:
     """Give threads: the integrator runs without the interpreter's lock."""
-    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+    with one_thread(), ThreadPoolExecutor(max(jobs, 1)) as pool:
         yield pool
 
 

@@ -115,14 +115,16 @@ def hats(values: FloatArray, low: float, high: float, count: int) -> FloatArray:
     return found
 
 
-def log_evidence(columns: FloatArray, target: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+def log_evidence(normal: FloatArray, slope: FloatArray) -> tuple[float, FloatArray, FloatArray]:
     """
     Return the log evidence of columns with Gaussian coefficients of the likeliest size.
 
     Parameters
     ----------
-    columns : numpy.ndarray, shape (n, k)
-    target : numpy.ndarray, shape (n,)
+    normal : numpy.ndarray, shape (k, k)
+        Products of the columns.
+    slope : numpy.ndarray, shape (k,)
+        Products of the columns and the target.
 
     Returns
     -------
@@ -133,8 +135,7 @@ def log_evidence(columns: FloatArray, target: FloatArray) -> tuple[float, FloatA
     numpy.ndarray, shape (k,)
         Their standard deviations.
     """
-    gram, slope = columns.T @ columns, columns.T @ target
-    values, vectors = np.linalg.eigh(gram)
+    values, vectors = np.linalg.eigh(normal)
     values = np.maximum(values, 0.0)
     turned = vectors.T @ slope
     largest = float(values[-1]) if values.size else 0.0
@@ -188,8 +189,7 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
             respond(pushed, probe_times(drive), frame.times, drive.channels, frame.order,
                     frame.cosine, frame.sine, whitener.model, setting('longest_step'), out)
             parts.append(whitener.apply(out))
-        gain, values, deviations = log_evidence(
-            projection.apply(np.concatenate(parts)), projection.target)
+        gain, values, deviations = log_evidence(*projection.problem(np.concatenate(parts)))
         return Effort(balance, argument, gain, low, high, values, deviations)
     tasks = [(b, a) for b in BALANCES for a in (
         CHASSIS if BALANCES[b][2] == 'none' else WHEELS)]

@@ -13,7 +13,13 @@ from lg_husky_sim.diagnosis.evidence.frames import Frame
 from lg_husky_sim.diagnosis.evidence.observation import Motion, observe, probe_times
 from lg_husky_sim.diagnosis.evidence.whitener import STATES
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, Numbers
-from lg_husky_sim.diagnosis.selection.screening import begin, in_proportion, Look, Projection
+from lg_husky_sim.diagnosis.selection.screening import (
+    begin,
+    gain_of,
+    in_proportion,
+    Look,
+    Projection,
+)
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Onset, OnsetKind
@@ -87,14 +93,13 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
             columns = _columns(evidence, base, motions, patterns, hypothesis, group)
             if columns is None:
                 continue
-            left = projection.apply(columns)
             flags = in_proportion(hypothesis, group)
-            for place, onset in enumerate(onsets):
-                own = left[:, place::len(onsets)]
-                gain, coefficients = projection.gain(own, flags)
+            for onset, normal, slope in zip(onsets, *projection.problems(columns, len(group)),
+                                            strict=True):
+                gain, coefficients = gain_of(normal, slope, flags)
                 if gain > (0.0 if best is None else best.gain):
                     at = hypothesis.at(onset)
-                    best = Look(at, begin(at, group, coefficients), gain, own)
+                    best = Look(at, begin(at, group, coefficients), gain)
         return best
     open_ones = [h for h in pool if h.effect.id not in _ALWAYS_ON and h.effect.shape != 'grip']
     return [one for one in evidence.pool.map(best_of, open_ones) if one is not None]

@@ -195,7 +195,7 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         seen = _looks(evidence, base, pool, [t.hypothesis.effect for t in tried])
         chosen = list(seen[:few])
         known = {one.hypothesis.label for one in chosen}
-        chosen += [Look(t.hypothesis, numbers_of(t), 0.0, np.zeros((0, 0))) for t in tried[:3]
+        chosen += [Look(t.hypothesis, numbers_of(t), math.inf) for t in tried[:3]
                    if t.hypothesis.label not in known]
         guide = replace(base.point, places=best.fit.point.places[:base.point.places.size])
         tried = fitted(evidence, base, chosen, [base.point, guide])
@@ -278,9 +278,9 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     """
     rough = []
     least = max(setting('least_look'), setting('look_part') * max(
-        (one.gain for one in looks), default=0.0))
+        (one.gain for one in looks if one.gain < math.inf), default=0.0))
     for one in looks:
-        if one.gain < least and one.columns.size:
+        if one.gain < least:
             continue
         result = attempt(evidence, base, one.hypothesis, [(p, one.numbers) for p in points],
                          whole=False)

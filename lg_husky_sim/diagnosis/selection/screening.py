@@ -37,15 +37,13 @@ class Look:
     numbers : mapping
         From where a fit may begin.
     gain : float
-        Linear estimate of what it lowers the cost by [nats].
-    columns : numpy.ndarray, shape (n, m)
-        Whitened changes, the base projected out.
+        Linear estimate of what it lowers the cost by [nats]; infinite for one that is fitted
+        whatever it promises.
     """
 
     hypothesis: Hypothesis
     numbers: Numbers
     gain: float
-    columns: FloatArray
 
 
 class Projection:
@@ -60,43 +58,86 @@ class Projection:
 
     def __init__(self, fit: Fit) -> None:
         nu = setting('student')
-        self._root = np.sqrt((nu + 1.0) / (nu + fit.whitened ** 2))
-        rows = fit.jacobian * self._root[:, None]
-        stacked = np.vstack([rows, np.diag(fit.point.weights)])
-        self._base, _ = np.linalg.qr(stacked)
-        self._count = fit.whitened.size
-        target = np.concatenate([self._root * fit.whitened, -fit.point.strain])
-        self.target: FloatArray = target - self._base @ (self._base.T @ target)
+        count = fit.whitened.size
+        root = np.sqrt((nu + 1.0) / (nu + fit.whitened ** 2))
+        stacked = np.vstack([fit.jacobian * root[:, None], np.diag(fit.point.weights)])
+        base, _ = np.linalg.qr(stacked)
+        target = np.concatenate([root * fit.whitened, -fit.point.strain])
+        target -= base @ (base.T @ target)
+        self._weights = root * root
+        self._base = np.ascontiguousarray((base[:count] * root[:, None]).T)
+        self._target = root * target[:count]
 
-    def apply(self, columns: FloatArray) -> FloatArray:
-        """Return columns with the base projected out, priors as further rows."""
-        stacked = np.zeros((self._base.shape[0], columns.shape[1]))
-        stacked[:self._count] = columns * self._root[:, None]
-        left: FloatArray = stacked - self._base @ (self._base.T @ stacked)
-        return left
-
-    def gain(self, left: FloatArray, free: Sequence[bool]) -> tuple[float, FloatArray]:
+    def problem(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
-        Return the gain of projected columns [nats] and their coefficients.
+        Return the normal equations that are left.
 
         Parameters
         ----------
-        left : numpy.ndarray, shape (n, m)
-        free : sequence of bool
-            Whether a coefficient may have any value; others stay near the size that was
-            simulated, since such numbers do not act in proportion.
+        columns : numpy.ndarray, shape (n, m)
+            Whitened changes.
+
+        Returns
+        -------
+        normal : numpy.ndarray, shape (m, m)
+        slope : numpy.ndarray, shape (m,)
         """
-        normal = left.T @ left
-        slope = left.T @ self.target
-        size = np.sqrt(np.diag(normal))
-        if not np.all(np.isfinite(size)) or np.any(size <= 1e-9):
-            return 0.0, np.zeros(left.shape[1])
-        scaled = normal / np.outer(size, size) + 1e-9 * np.eye(size.size)
-        coefficients = np.linalg.solve(scaled, slope / size) / size
-        low, high = setting('least_factor'), setting('most_factor')
-        kept = np.where(np.asarray(free, dtype=np.bool_), coefficients,
-                        np.clip(coefficients, low, high))
-        return float(kept @ slope - 0.5 * kept @ normal @ kept), kept
+        explained = self._base @ columns
+        normal = columns.T @ (columns * self._weights[:, None]) - explained.T @ explained
+        return normal, self._target @ columns
+
+    def problems(self, columns: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
+        """
+        Return the normal equations of many sets of columns at once.
+
+        Parameters
+        ----------
+        columns : numpy.ndarray, shape (n, size * m)
+            Whitened changes: the first column of all m sets, then the second of all, and so on.
+        size : int
+            Columns of a set.
+
+        Returns
+        -------
+        normal : numpy.ndarray, shape (m, size, size)
+        slope : numpy.ndarray, shape (m, size)
+        """
+        count = columns.shape[1] // size
+        explained = (self._base @ columns).reshape(-1, size, count)
+        slope = (self._target @ columns).reshape(size, count).T
+        weighted = (columns * self._weights[:, None]).reshape(-1, size, count)
+        whole = columns.reshape(-1, size, count)
+        normal = np.empty((count, size, size))
+        for i in range(size):
+            for j in range(i + 1):
+                normal[:, i, j] = normal[:, j, i] = (
+                    np.einsum('nm,nm->m', weighted[:, i], whole[:, j])
+                    - np.einsum('km,km->m', explained[:, i], explained[:, j]))
+        return normal, slope
+
+
+def gain_of(normal: FloatArray, slope: FloatArray, free: Sequence[bool]
+            ) -> tuple[float, FloatArray]:
+    """
+    Return the gain of projected columns [nats] and their coefficients.
+
+    Parameters
+    ----------
+    normal : numpy.ndarray, shape (m, m)
+    slope : numpy.ndarray, shape (m,)
+    free : sequence of bool
+        Whether a coefficient may have any value; others stay near the size that was
+        simulated, since such numbers do not act in proportion.
+    """
+    size = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    if not np.all(np.isfinite(size)) or np.any(size <= setting('rounding')):
+        return 0.0, np.ones(size.size)
+    scaled = normal / np.outer(size, size) + 1e-9 * np.eye(size.size)
+    coefficients = np.linalg.solve(scaled, slope / size) / size
+    low, high = setting('least_factor'), setting('most_factor')
+    kept = np.where(np.asarray(free, dtype=np.bool_), coefficients,
+                    np.clip(coefficients, low, high))
+    return float(kept @ slope - 0.5 * kept @ normal @ kept), kept
 
 
 def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]:
@@ -117,30 +158,71 @@ def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]
     """
     projection = Projection(fit)
 
-    def change(task: tuple[Hypothesis, Numbers]) -> list[FloatArray] | None:
-        hypothesis, numbers = task
-        try:
-            predicted = evidence.predict(hypothesis.point(fit.point, numbers))
-        except LgHuskyError:
+    def tried(hypothesis: Hypothesis, group: Sequence[Numbers]) -> _Rung | None:
+        columns = []
+        for numbers in group:
+            try:
+                predicted = evidence.predict(hypothesis.point(fit.point, numbers))
+            except LgHuskyError:
+                return None
+            columns.append([a - b for a, b in zip(predicted, fit.predicted, strict=True)])
+        stacked = [np.column_stack(one) for one in zip(*columns, strict=True)]
+        if not all(np.all(np.isfinite(one)) for one in stacked):
             return None
-        return [a - b for a, b in zip(predicted, fit.predicted, strict=True)]
+        normal, slope = projection.problem(evidence.whiten(stacked))
+        gain, coefficients = gain_of(normal, slope, in_proportion(hypothesis, group))
+        return _Rung(group, normal, slope, gain, coefficients)
 
-    tasks = [(h, group) for h in pool for group in h.trials()]
-    flat = [(h, numbers) for h, group in tasks for numbers in group]
-    changes = iter(list(evidence.pool.map(change, flat)))
-    best: dict[str, Look] = {}
-    for hypothesis, group in tasks:
-        columns = [next(changes) for _ in group]
-        if any(c is None or not all(np.all(np.isfinite(p)) for p in c) for c in columns):
-            continue
-        stacked = [np.column_stack([c[d] for c in columns if c is not None])
-                   for d in range(len(evidence.drives))]
-        left = projection.apply(evidence.whiten(stacked))
-        gain, coefficients = projection.gain(left, in_proportion(hypothesis, group))
-        if hypothesis.label not in best or gain > best[hypothesis.label].gain:
-            best[hypothesis.label] = Look(
-                hypothesis, begin(hypothesis, group, coefficients), gain, left)
-    return sorted(best.values(), key=lambda one: -one.gain)
+    def seen(hypothesis: Hypothesis) -> Look | None:
+        rungs = [one for group in hypothesis.trials()
+                 if (one := tried(hypothesis, group)) is not None]
+        if not rungs:
+            return None
+        rungs.sort(key=lambda one: one.strength)
+        while (group := _weaker(hypothesis, rungs)) is not None and (
+                one := tried(hypothesis, group)) is not None and (
+                    one.strength < rungs[0].strength):
+            rungs.insert(0, one)
+        best = max(rungs, key=lambda one: one.gain)
+        return Look(hypothesis, begin(hypothesis, best.group, best.coefficients), best.gain)
+    found = [one for one in evidence.pool.map(seen, pool) if one is not None]
+    return sorted(found, key=lambda one: -one.gain)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rung:
+    """A size at which an effect was tried."""
+
+    group: Sequence[Numbers]
+    normal: FloatArray
+    slope: FloatArray
+    gain: float
+    coefficients: FloatArray
+
+    @property
+    def strength(self) -> float:
+        return float(np.trace(self.normal))
+
+
+def _weaker(hypothesis: Hypothesis, rungs: Sequence[_Rung]) -> list[Numbers] | None:
+    # The ladder of sizes goes on below its weakest one as long as the readings point that way
+    # and want less of it.
+    if len(rungs) < 2 or all(in_proportion(hypothesis, rungs[0].group)):
+        return None
+    first, second = rungs[0], rungs[1]
+    wanted = np.linalg.lstsq(first.normal, first.slope, rcond=1e-9)[0]
+    if (0.5 * float(wanted @ first.slope) < setting('least_look')
+            or np.min(wanted) >= setting('least_factor')):
+        return None
+    found: list[Numbers] = []
+    for near, far in zip(first.group, second.group, strict=True):
+        numbers = dict(near)
+        for p in hypothesis.free:
+            if near[p.name] * far[p.name] > 0.0:
+                value = near[p.name] ** 2 / far[p.name]
+                numbers[p.name] = min(max(value, p.lower), p.upper)
+        found.append(numbers)
+    return found if found != list(first.group) else None
 
 
 def in_proportion(hypothesis: Hypothesis, group: Sequence[Numbers]) -> list[bool]:

@@ -1,0 +1,59 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Efforts that come in bursts: gusts, kicks, a load that swings.
+
+A noise whose intensity is estimated takes them in as if they were everywhere. They show in the
+scores ``z = c' e / |c|`` of short efforts one after the other: of one scale if the effort is the
+same noise all the time, of two where it bursts. The evidence is the ratio of the likelihoods of
+both, less what the two further numbers cost::
+
+    log p(z; (1 - q) N(0, a^2) + q N(0, b^2)) - log p(z; N(0, s^2)) - log n
+"""
+
+from __future__ import annotations
+
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+
+def burst_evidence(scores: FloatArray) -> float:
+    """
+    Return the evidence that scores have two scales.
+
+    Parameters
+    ----------
+    scores : numpy.ndarray, shape (n,)
+        In the order of time. The strongest one and its neighbours are left out: what happens
+        once is an accident of a log more often than physics.
+
+    Returns
+    -------
+    float
+        [nats]
+    """
+    strongest = int(np.argmax(np.abs(scores))) if scores.size else 0
+    reach = int(setting('burst_reach'))
+    squares = np.delete(scores, np.arange(
+        max(0, strongest - reach), min(scores.size, strongest + reach + 1))) ** 2
+    if squares.size < int(setting('burst_least')) or not np.any(squares > 0.0):
+        return 0.0
+    usual = float(np.mean(squares))
+    single = -0.5 * float(np.sum(squares / usual + np.log(usual)))
+    share = setting('burst_share')
+    large = float(np.mean(np.sort(squares)[-max(1, int(share * squares.size)):]))
+    small = float(np.median(squares))
+    least = 1e-6 * usual
+    before = -np.inf
+    while True:
+        quiet = np.log1p(-share) - 0.5 * (squares / small + np.log(small))
+        burst = np.log(share) - 0.5 * (squares / large + np.log(large))
+        both = np.logaddexp(quiet, burst)
+        found = float(np.sum(both))
+        if found < before + setting('fit_converged'):
+            return max(found, before) - single - float(np.log(squares.size))
+        before, part = found, np.exp(burst - both)
+        share = float(np.clip(np.mean(part), 1.0 / squares.size, 0.5))
+        small = max(float(np.sum((1.0 - part) * squares) / np.sum(1.0 - part)), least)
+        large = max(float(np.sum(part * squares) / np.sum(part)), least)

@@ -1,0 +1,119 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a first look promises, and what no name explains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.selection.screening import look, Projection
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import Recording
+from lg_husky_sim.signals import FloatArray, TimeSeries
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+#: Weaker than every size from which a look begins.
+MILD = {'slew_forward': 14.0, 'slew_yaw': 28.0}
+
+
+@pytest.fixture(scope='module')
+def base(record: Callable[..., Recording], steps: Sequence[tuple[float, float, float]]
+         ) -> Iterator[tuple[Evidence, Fit]]:
+    """Return the evidence of a drive with a mild limit of acceleration, and the fit without."""
+    model, effect = load_model(), Effect('command_slew', shape='both')
+    plant = compile_model(model.structure.with_effect(effect)).at(
+        model.parameters.with_entries(*entries_of(effect, MILD)))
+    drives = drives_of([record('ahead', plant, steps, 3)])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with ThreadPoolExecutor(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        yield evidence, evidence.fit(start, rounds=3)
+
+
+def test_looks_go_on_below_the_weakest_size(base: tuple[Evidence, Fit]) -> None:
+    evidence, fit = base
+    pool = hypotheses(fit.point.structure)
+    slews = [h for h in pool if h.effect.id == 'command_slew']
+    weakest = max(p.starts[-1] for h in slews for p in h.free if p.name == 'slew_forward')
+    assert weakest < MILD['slew_forward']
+    found = look(evidence, fit, pool)
+    assert found[0].hypothesis.label == 'command_slew:both'
+    assert found[0].gain > 20.0
+
+
+def test_products_are_those_of_columns_without_what_the_base_explains(
+        base: tuple[Evidence, Fit]) -> None:
+    evidence, fit = base
+    columns = np.random.default_rng(4).standard_normal((evidence.count, 6))
+    columns[:, 0] += 3.0 * fit.jacobian[:, 0]
+    normal, slope = Projection(fit).problem(columns)
+    wanted, pulled = _least_squares(fit, columns)
+    np.testing.assert_allclose(normal, wanted, rtol=1e-8, atol=1e-8 * np.max(wanted))
+    np.testing.assert_allclose(slope, pulled, rtol=1e-7, atol=1e-8 * np.max(np.abs(pulled)))
+    normals, slopes = Projection(fit).problems(columns, 2)
+    for place in range(3):
+        own = [place, place + 3]
+        np.testing.assert_allclose(normals[place], normal[np.ix_(own, own)], rtol=1e-9)
+        np.testing.assert_allclose(slopes[place], slope[own], rtol=1e-9)
+
+
+def _least_squares(fit: Fit, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    # The base and its priors taken out by numpy's least squares.
+    nu = setting('student')
+    root = np.sqrt((nu + 1.0) / (nu + fit.whitened ** 2))[:, None]
+    base = np.vstack([root * fit.jacobian, np.diag(fit.point.weights)])
+    padded = np.vstack([root * columns, np.zeros((base.shape[1], columns.shape[1]))])
+    target = np.concatenate([root[:, 0] * fit.whitened, -fit.point.strain])
+    left = padded - base @ np.linalg.lstsq(base, padded, rcond=None)[0]
+    return left.T @ left, left.T @ target
+
+
+def test_gusts_at_scattered_moments_are_unknown(
+        record: Callable[..., Recording], steps: Sequence[tuple[float, float, float]]) -> None:
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    long = [*steps, *steps]
+    recordings = [gusty(record('ahead', plant, long, 1), (4.3, 11.8, 22.9, 31.5)),
+                  gusty(record('back', plant, long[::-1], 2), (3.2, 13.7, 20.1, 34.4))]
+    found = diagnose(recordings, model, lambda text, share: None).diagnosis
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.findings[0].subsystem == 'rotation'
+    assert 'scattered moments' in found.findings[0].statement
+
+
+def gusty(recording: Recording, moments: Sequence[float]) -> Recording:
+    """Return a recording of a robot that gusts turned, now to the left and now to the right."""
+    gyro, pose = recording.streams['imu'], recording.streams['pose']
+    heading = np.zeros(pose.times.size)
+    rates = np.zeros(gyro.times.size)
+    for place, moment in enumerate(moments):
+        gust = norm(loc=moment, scale=0.3)
+        size = 0.12 * (-1.0) ** place
+        rates += size * gust.pdf(gyro.times - gyro.times[0])
+        heading += size * gust.cdf(pose.times - pose.times[0])
+    values = np.array(pose.values)
+    x, y, yaw = (pose.names.index(name) for name in ('x', 'y', 'heading'))
+    step = np.diff(values[:, x] + 1j * values[:, y]) * np.exp(1j * heading[1:])
+    path = np.concatenate([[0.0], np.cumsum(step)]) + values[0, x] + 1j * values[0, y]
+    values[:, x], values[:, y], values[:, yaw] = path.real, path.imag, values[:, yaw] + heading
+    turned = np.array(gyro.values)
+    turned[:, gyro.names.index('yaw_rate')] += rates
+    return replace(recording, streams={
+        **recording.streams, 'imu': TimeSeries(gyro.times, turned, gyro.names),
+        'pose': TimeSeries(pose.times, values, pose.names)})
