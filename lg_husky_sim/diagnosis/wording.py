@@ -36,7 +36,7 @@ def effect_words(effect: Effect) -> str:
     side = '' if effect.side in ('none', '') else {
         'both': ' (both sides)', 'left': ' (left side)', 'right': ' (right side)'}[effect.side]
     if effect.id == 'sensor_time_offset':
-        return f'the stamps {_STREAMS[effect.shape]} are late'
+        return f'the stamps {_STREAMS[effect.shape]} lag behind'
     return f'{effect.kind.title}{side}'
 
 

@@ -69,7 +69,7 @@ def test_command_writes_a_script_that_can_be_driven(tmp_path: Path, capsys: Any)
     (['--effects', 'slope'], 'two different ids'),
     (['--effects', 'slope,slope'], 'two different ids'),
     (['--effects', 'slope,sloppe'], 'did you mean slope'),
-    (['nowhere'], 'no folder of a diagnosis'),
+    (['nowhere'], 'not the folder of a diagnosis'),
 ])
 def test_bad_input_is_one_line(arguments: list[str], message: str, tmp_path: Path,
                                capsys: Any) -> None:
