@@ -108,4 +108,4 @@ def test_folder_of_two_diagnoses_is_refused(tmp_path: Path, capsys: Any) -> None
     (tmp_path / 'diagnosis.json').write_text(json.dumps({'findings': [{
         'effect': 'slope', 'rivals': [{'effect': 'gyro_bias', 'side': 'none'}]}]}))
     assert run(['plan-drive', str(tmp_path), '--out', str(tmp_path / 's.yaml')]) == 1
-    assert 'model.yaml has no slope that plain.yaml has not' in capsys.readouterr().err
+    assert 'model.yaml does not add it to plain.yaml' in capsys.readouterr().err
