@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+import itertools
 import math
 
 from lg_husky_sim.diagnosis.decision.adoption import chance_of, dispersion, is_beyond_chance
@@ -198,7 +199,7 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         chosen += [Look(t.hypothesis, numbers_of(t), math.inf) for t in tried[:3]
                    if t.hypothesis.label not in known]
         guide = replace(base.point, places=best.fit.point.places[:base.point.places.size])
-        tried = fitted(evidence, base, chosen, [base.point, guide])
+        tried = fitted(evidence, base, chosen, [base.point, guide], tried[:3])
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     tried.sort(key=lambda t: (is_negligible(t), -t.score))
@@ -256,7 +257,7 @@ def numbers_of(tried: Tried) -> Numbers:
 
 
 def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequence[Point],
-           whole: bool = True) -> list[Tried]:
+           earlier: Sequence[Tried] = (), *, whole: bool = True) -> list[Tried]:
     """
     Fit hypotheses from where looks and points say, order by score.
 
@@ -269,6 +270,8 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     looks : sequence of Look
     points : sequence of Point
         Of the base, from where a fit may begin.
+    earlier : sequence of Tried
+        Whose numbers are beginnings, too.
     whole : bool
         Whether to finish the fits of the best ones.
 
@@ -282,7 +285,9 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     for one in looks:
         if one.gain < least:
             continue
-        result = attempt(evidence, base, one.hypothesis, [(p, one.numbers) for p in points],
+        numbers = [one.numbers, *(numbers_of(t) for t in earlier
+                                  if t.hypothesis.label == one.hypothesis.label)]
+        result = attempt(evidence, base, one.hypothesis, list(itertools.product(points, numbers)),
                          whole=False)
         if result is not None:
             rough.append(result)

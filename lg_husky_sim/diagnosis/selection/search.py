@@ -68,10 +68,14 @@ def _as_logged(evidence: Evidence, base: Fit) -> tuple[Fit, list[Tried]]:
         return base, []
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
     seen = look(evidence, base, pool)[:int(setting('readings_fitted'))]
-    promised = (1.0 + setting('near_margin')) * (base.cost - chosen.cost)
     better = [t for t in fitted(evidence, base, seen, [base.point], whole=False)
-              if t.gain > promised]
+              if t.gain > _promised(base, chosen)]
     return (base if better else chosen), better
+
+
+def _promised(base: Fit, chosen: Fit) -> float:
+    # What an effect has to gain for another reading to wait.
+    return (1.0 + setting('near_margin')) * (base.cost - chosen.cost)
 
 
 def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]:
@@ -130,10 +134,12 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     chosen, early = _as_logged(evidence, rough)
     start = _nominal(chosen.point)
     evidence, base = calibrated(evidence.about(start), start)
+    seeds = _seeds(first, rough, base, early)
     chosen, better = _as_logged(evidence, base)
+    if seeds and seeds[0].gain > _promised(base, chosen):
+        chosen, better = base, seeds
     postponed = bool(better)
     evidence, base = _read_as(evidence, base, chosen)
-    seeds = _seeds(first, rough, base, early)
     usual = Reading()
     start = _nominal(base.point)
     plain = base
