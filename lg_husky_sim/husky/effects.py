@@ -95,6 +95,8 @@ class EffectParameter:
     negligible : float
         How far from none of it a robot may be without anything missing from its model [unit]; 0
         where every size counts.
+    shapes : tuple of str
+        Forms that have it; empty for all.
     """
 
     name: str
@@ -105,6 +107,7 @@ class EffectParameter:
     source: str
     fixed: bool = False
     negligible: float = 0.0
+    shapes: tuple[str, ...] = ()
 
     def parameter(self, value: float | None = None) -> Parameter:
         """Return it as a parameter with ``value``, or with its first start."""
@@ -145,8 +148,14 @@ class EffectKind:
     parameters : tuple of EffectParameter
     sides, shapes : tuple of str
         Sides it can act on and forms it can take; the first is the default.
-    needs_onset : bool
-        Whether it only makes sense with an onset.
+    onset : str
+        ``required`` where it only makes sense with one, ``never`` where it is always on, since
+        it adds states; else empty.
+    drivetrain : str
+        The drivetrain that has it; empty for any.
+    sensors, manoeuvres : tuple of str
+        What tells it apart from others: a sensor that sees it directly, a drive that brings it
+        out.
     advice : Remedy
     """
 
@@ -157,8 +166,21 @@ class EffectKind:
     parameters: tuple[EffectParameter, ...]
     sides: tuple[str, ...] = ('none',)
     shapes: tuple[str, ...] = ('',)
-    needs_onset: bool = False
+    onset: str = ''
+    drivetrain: str = ''
+    sensors: tuple[str, ...] = ()
+    manoeuvres: tuple[str, ...] = ()
     advice: Remedy = Remedy()
+
+    @property
+    def needs_onset(self) -> bool:
+        """Whether it only makes sense with an onset."""
+        return self.onset == 'required'
+
+    @property
+    def always_on(self) -> bool:
+        """Whether it adds states, so that it cannot begin at an onset."""
+        return self.onset == 'never'
 
 
 @dataclass(frozen=True)
@@ -213,16 +235,8 @@ class Effect:
 
     def parameters(self) -> tuple[EffectParameter, ...]:
         """Return the numbers that this side and shape have."""
-        unused = {('command_slew', 'forward'): ('slew_yaw',),
-                  ('command_slew', 'yaw'): ('slew_forward',),
-                  ('command_limit', 'forward'): ('limit_yaw',),
-                  ('command_limit', 'yaw'): ('limit_forward',),
-                  ('viscous_asymmetry', 'slip'): ('extra_damping',),
-                  ('viscous_asymmetry', 'bearing'): ('damping_change',),
-                  ('terrain_change', 'damping'): ('grip_change',),
-                  ('terrain_change', 'grip'): ('wheel_damping_change', 'yaw_damping_change'),
-                  ('driver_deadband', 'zone'): ('dead_edge',)}.get((self.id, self.shape), ())
-        own = tuple(p for p in self.kind.parameters if p.name not in unused)
+        own = tuple(p for p in self.kind.parameters
+                    if not p.shapes or self.shape in p.shapes)
         return tuple(replace(p, name=p.name + LATER) for p in own) if self.again else own
 
     @property
@@ -259,12 +273,14 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
     parameters = tuple(
         EffectParameter(key, str(p['unit']), float(p['lower']), float(p['upper']),
                         tuple(float(s) for s in p['starts']), str(p['source']),
-                        bool(p.get('fixed', False)), float(p.get('negligible', 0.0)))
+                        bool(p.get('fixed', False)), float(p.get('negligible', 0.0)),
+                        tuple(p.get('shapes', ())))
         for key, p in entry['parameters'].items())
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),
         parameters, tuple(entry.get('sides', ('none',))), tuple(entry.get('shapes', ('',))),
-        entry.get('onset') == 'required',
+        str(entry.get('onset', '')), str(entry.get('drivetrain', '')),
+        tuple(entry.get('sensors', ())), tuple(entry.get('manoeuvres', ())),
         Remedy(*(tuple(entry.get('advice', {}).get(place, ())) for place in (
             'robot', 'simulator'))))
 
@@ -284,6 +300,11 @@ def catalogue() -> Mapping[str, EffectKind]:
     if data.get('schema') != 'lg_husky_sim/effects/1':
         raise ModelFileError(f'{path}: not a catalogue of effects (schema lg_husky_sim/effects/1)')
     return {name: _read_kind(name, entry) for name, entry in data['effects'].items()}
+
+
+def always_on() -> list[str]:
+    """Return the ids of the effects that add states, so that they cannot begin at an onset."""
+    return [name for name, kind in catalogue().items() if kind.always_on]
 
 
 @cache

@@ -6,8 +6,8 @@ The non-linear laws f(z) that a modulated source of the graph may follow.
 Each effort of a plant is one row: the number of its law, up to ``WIDTH`` coefficients, and the
 place where its arguments begin in ``z``. One interpreter evaluates all rows, so that a new set of
 efforts needs no new machine code. ``context`` holds what is not in the graph:
-[time, heading, x, y, angle_left, angle_right]. ``memory`` holds four accumulators:
-[heat_left, heat_right, gap_left, gap_right].
+[time, heading, x, y, angle_left, angle_right]. ``memory`` holds eight accumulators:
+[heat_left, heat_right, gap_left, gap_right, held_left, held_right, tyre_left, tyre_right].
 """
 
 from __future__ import annotations
@@ -27,8 +27,11 @@ CEILING = WIDTH - 1
 OF_THE_DRIVER = (7, 8, 9, 10, 11, 12)
 #: Length of the context vector: time, heading, x, y, angle_left, angle_right, sub-step.
 CONTEXT = 7
-#: Length of the memory vector: heat of both motors, play of both gears.
-MEMORY = 4
+#: Length of the memory vector: heat of both motors, play of both gears, what static friction
+#: gives way on both axles and at the tyres of both sides.
+MEMORY = 8
+#: Where in it the play begins, and what gives way.
+GAPS, HELD = 2, 4
 
 
 class Law(enum.IntEnum):
@@ -77,6 +80,10 @@ class Law(enum.IntEnum):
     FRICTION_CIRCLE = 16
     """f = ((1 + q^3)^(-1/3) - 1) p1 z0, q = sqrt((p1 z0)^2 + (p2 z1)^2)/p0: a damping p1 that
     saturates together with another one, p2; nearly as the hyperbolic tangent does."""
+    STICTION = 17
+    """f = -(p0/p1) (held + p4 max(E^2 - (held/p1)^2, 0) z0), E = exp(-(z1/p3)^2), held' = z0
+    within |held| <= p1 E: what rests is held by a damped spring that gives way by p1 and carries
+    p0 at most, until z1 moves; p2 is 0 or 1 (left or right axle), 2 or 3 (tyres there)."""
 
 
 #: The laws as expressions of the linear graph: arguments z1, z2, ..., coefficients p0, p1, ...
@@ -100,9 +107,15 @@ EXPRESSIONS = {
     Law.TABLE: 'table',
     Law.FRICTION_CIRCLE: (
         '(1/(1+(((p1*z1)**2+(p2*z2)**2)/p0**2)**1.5)**0.3333333333333333-1)*p1*z1'),
+    Law.STICTION: (
+        '-p0/p1*(held+p4*z1*(exp(-2*(z2/p3)**2)-(held/p1)**2'
+        '+abs(exp(-2*(z2/p3)**2)-(held/p1)**2))/2)+0*p2'),
 }
+#: Laws that depend on where the robot is, and laws that advance a memory each time they are met.
+CONTEXTUAL = (Law.HEADING, Law.WHEEL_PHASE, Law.TABLE)
+REMEMBERING = (Law.HEATING, Law.BACKLASH, Law.STICTION)
 #: Names in the expressions that are signals, not parameters.
-SIGNALS = ('heading', 'angle', 'time', 'heat', 'in_play', 'table')
+SIGNALS = ('heading', 'angle', 'time', 'heat', 'in_play', 'table', 'held')
 
 
 @jit_part
@@ -157,7 +170,7 @@ def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int
     if law == 13:
         return float(-p0 * memory[int(p2)] * own)
     rate = z[o] / p1 - z[o + 1]
-    left = 0.5 * p0 - math.copysign(1.0, rate) * memory[2 + int(p2)]
+    left = 0.5 * p0 - math.copysign(1.0, rate) * memory[GAPS + int(p2)]
     if left <= 0.0:
         return 0.0
     return float(-p1 * z[o + 2] * (1.0 if abs(rate) * step < left else left / (
@@ -214,6 +227,10 @@ def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatA
             own, other = p1 * z[o], p2 * z[o + 1]
             square = (own * own + other * other) / (p0 * p0)
             out[j] = ((1.0 + square * math.sqrt(square)) ** (-1.0 / 3.0) - 1.0) * own
+        elif law == 17:
+            held, share = memory[HELD + int(p2)], z[o + 1] / coefficients[c, j, 3]
+            free = math.exp(-2.0 * share * share) - held * held / (p1 * p1)
+            out[j] = -p0 / p1 * (held + coefficients[c, j, 4] * max(free, 0.0) * z[o])
         elif law == 15:
             selector = int(p0)
             out[j] = _table(coefficients, c, j, z[o] if selector < 0 else context[selector])

@@ -11,8 +11,8 @@ from functools import lru_cache
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky import network
-from lg_husky_sim.husky.edits import branch_of, CHANGES_VALUES, edit, EditedNetwork
-from lg_husky_sim.husky.effects import Effect, Onset
+from lg_husky_sim.husky.edits import branch_of, edit, EditedNetwork, stage_of
+from lg_husky_sim.husky.effects import always_on, Effect, Onset
 from lg_husky_sim.husky.laws import WIDTH
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet, SensorModel
@@ -21,9 +21,6 @@ from lg_husky_sim.husky.speed_loop import STATES as LOOP_STATES
 from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, NumericModel, StateSpace
 from lg_husky_sim.linear_graph.expressions import compile_tuple, GLOBALS
 import numpy as np
-
-#: Efforts of gravity.
-GRAVITY = ('F_slope',)
 
 
 class Drivetrain(enum.Enum):
@@ -69,8 +66,8 @@ class Structure:
     def with_effect(self, effect: Effect, onset: Onset | None = None) -> Structure:
         """Return this structure with one effect more; a belt needs the expanded drivetrain."""
         drivetrain = self.drivetrain
-        if effect.id == 'belt_compliance':
-            drivetrain = Drivetrain.EXPANDED
+        if effect.kind.drivetrain:
+            drivetrain = Drivetrain(effect.kind.drivetrain)
         return Structure(drivetrain, (*self.effects, effect), onset or self.onset)
 
     def network(self, late: bool = True) -> EditedNetwork:
@@ -93,8 +90,7 @@ class Structure:
                 e.id != 'traction_saturation' for e in there):
             raise ParameterError('effect terrain_change of shape grip changes a limit of the '
                                  'tyres; it needs traction_saturation')
-        # What changes values comes first: laws are written with the values that they find.
-        for effect in sorted(there, key=lambda e: e.id not in CHANGES_VALUES):
+        for effect in sorted(there, key=stage_of):
             edited = edit(edited, effect)
         return edited
 
@@ -143,7 +139,7 @@ class _Regime:
         counts = [len(branch_of(edited.graph, name).characteristic.of)  # type: ignore[union-attr]
                   for name in self.numeric.efforts]
         self._offsets = np.cumsum([0, *counts], dtype=np.int64)[:-1]
-        self._felt = np.array([name not in GRAVITY for name in self.numeric.efforts], dtype=float)
+        self._felt = np.array([row.felt for row in rows], dtype=float)
         self._volts = np.zeros((2, len(rows)))
         for j, name in enumerate(self.numeric.efforts):
             if name.startswith('E_'):
@@ -232,8 +228,8 @@ def _compiled(drivetrain: Drivetrain, effects: tuple[Effect, ...]) -> tuple[_Reg
         regimes.insert(0, _regime(early))
         if len(regimes[0].numeric.states) != len(regimes[1].numeric.states) or (
                 regimes[0].edited.speed_loop != regimes[1].edited.speed_loop):
-            raise ParameterError(
-                'a late effect may not add states: belt_compliance and speed_loop are always on')
+            raise ParameterError('a late effect may not add states: '
+                                 f'{", ".join(always_on())} are always on')
     return tuple(regimes)
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from lg_husky_sim.husky.laws import evaluate
+from lg_husky_sim.husky.laws import evaluate, GAPS, HELD
 from lg_husky_sim.jit import jit_part
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.modal_kernel import add_product, advance, doubled, Packed, phis
@@ -35,8 +35,9 @@ class Step(NamedTuple):
 
     ``f`` has the efforts at the start, the middle and the end in rows, ``parabola`` the other
     coefficients of the parabola through them, ``former`` those of the step before. ``z`` has the
-    laws' arguments at those three places and at a quarter, ``kept`` the memories at the middle
-    and the end; in ``p``, ``change`` and ``old`` are a quarter, the middle and the end.
+    laws' arguments at those three places and at a quarter, ``swept`` their integrals, ``kept`` the
+    memories at the middle and the end; in ``p``, ``change`` and ``old`` are a quarter, the middle
+    and the end.
     """
 
     xi: FloatArray
@@ -49,6 +50,7 @@ class Step(NamedTuple):
     former: FloatArray
     z: FloatArray
     line: FloatArray
+    swept: FloatArray
     context: FloatArray
     now: FloatArray
     kept: FloatArray
@@ -96,9 +98,14 @@ def effect(plant: Packed, c: int, step: Step, row: int, node: int, t: float) -> 
 
 
 @jit_part
-def memories(plant: Packed, c: int, begin: FloatArray, z: FloatArray, node: int, step: float,
-             now: FloatArray) -> None:
-    """Put heat and play after ``step`` [s] into ``now``: at the middle (0) or the end (1)."""
+def memories(plant: Packed, c: int, begin: FloatArray, z: FloatArray, swept: FloatArray,
+             node: int, step: float, now: FloatArray) -> None:
+    """
+    Put the memories after ``step`` [s] into ``now``: at the middle (0) or the end (1).
+
+    ``swept`` has the integrals of the laws' arguments, where a law needs them exactly: what is
+    held at rest would creep with the error of a mean.
+    """
     for i in range(begin.size):
         now[i] = begin[i]
     for j in range(plant.counts[c, 2]):
@@ -115,7 +122,11 @@ def memories(plant: Packed, c: int, begin: FloatArray, z: FloatArray, node: int,
             if node == 1:
                 mean = (z[0, o] / p1 - z[0, o + 1] + 4.0 * (z[1, o] / p1 - z[1, o + 1])
                         + z[2, o] / p1 - z[2, o + 1]) / 6.0
-            now[2 + side] = max(-0.5 * p0, min(0.5 * p0, begin[2 + side] + step * mean))
+            now[GAPS + side] = max(-0.5 * p0, min(0.5 * p0, begin[GAPS + side] + step * mean))
+        elif plant.laws[c, j] == 17:
+            share = z[node + 1, o + 1] / plant.coefficients[c, j, 3]
+            limit = p1 * math.exp(-share * share)
+            now[HELD + side] = max(-limit, min(limit, begin[HELD + side] + swept[o]))
 
 
 @jit_part
@@ -163,7 +174,14 @@ def _efforts_at(plant: Packed, c: int, s: FloatArray, n: int, time: float, at: f
         surroundings(step.context, time + at, s, n, step.four, step.tangent)
     if plant.counts[c, 4]:
         if node > 0:
-            memories(plant, c, memory, step.z, node - 1, at, step.now)
+            if plant.counts[c, 6]:
+                if not plant.counts[c, 3]:
+                    advance(at, 1, step.xi, step.r, step.q, step.p, node, n_real, n_pairs,
+                            step.xt)
+                for i in range(step.swept.size):
+                    step.swept[i] = 0.0
+                add_product(plant.hm, c, step.xt, step.xt.size, step.swept)
+            memories(plant, c, memory, step.z, step.swept, node - 1, at, step.now)
         for i in range(memory.size):
             if node > 0:
                 step.kept[node - 1, i] = step.now[i]

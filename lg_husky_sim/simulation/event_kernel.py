@@ -14,9 +14,9 @@ The flat state vector S is laid out as (n = states of the graph and of its contr
     S[0:n]       states
     S[n:n+4]     angle_left, angle_right, distance, heading
     S[n+4:n+7]   x, y, time
-    S[n+7:n+11]  memories (laws.MEMORY)
-    S[n+11:n+13] shaped command (forward, yaw)
-    S[n+13:n+15] command in force before the first one that takes effect
+    S[n+7:...]   memories (laws.MEMORY)
+    S[n+SHAPED:] shaped command (forward, yaw)
+    S[n+WANTED:] command in force before the first one that takes effect (forward, yaw)
 """
 
 from __future__ import annotations
@@ -47,8 +47,10 @@ from numpy.typing import NDArray
 COLUMNS = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate', 'current_left', 'current_right',
            'accel_x', 'angle_left', 'angle_right', 'distance', 'heading', 'x', 'y',
            'voltage_left', 'voltage_right')
-#: Entries of the flat state behind those of graph and controllers.
-TAIL = 4 + 3 + MEMORY + 2 + 2
+#: Where commands stand in the flat state, behind the n states of graph and controllers, and how
+#: many entries there are behind those.
+SHAPED = 4 + 3 + MEMORY
+WANTED, TAIL = SHAPED + 2, SHAPED + 4
 #: Shortest and longest step of a plant with efforts [s].
 SHORTEST, LONGEST = 1e-5, 0.05
 #: Panels of the pose: the first after a jump [s], growth with the time since then, the longest
@@ -129,7 +131,7 @@ def _follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatA
     xi, r, u, du = step.xi, step.r, step.u, step.du
     goals, tangent, work = block.goals, step.tangent, step.work
     for i in range(2):
-        drive.shaped[i], drive.wanted[i] = s[n + 11 + i], s[n + 13 + i]
+        drive.shaped[i], drive.wanted[i] = s[n + SHAPED + i], s[n + WANTED + i]
         play[i] = memory[2 + i]
     t, until, onset, kind = s[n + 6], s[n + 6], plant.onset[1], plant.onset[0]
     # Whether the second set is in force: a place is crossed where it is found to be.
@@ -146,7 +148,7 @@ def _follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatA
                 _change_set(plant, c, int(beyond), states, xi)
                 c = int(beyond)
                 drive.given[0] = 0
-                drive.wanted[0], drive.wanted[1] = s[n + 13], s[n + 14]
+                drive.wanted[0], drive.wanted[1] = s[n + WANTED], s[n + WANTED + 1]
                 jump = 0.0
             if t >= end and steps > 0:
                 break
@@ -285,7 +287,7 @@ def _follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatA
     _change_set(plant, c, c, states, xi)
     s[n + 6] = t
     for i in range(2):
-        s[n + 11 + i], s[n + 13 + i] = drive.shaped[i], drive.wanted[i]
+        s[n + SHAPED + i], s[n + WANTED + i] = drive.shaped[i], drive.wanted[i]
     return steps
 
 
@@ -323,13 +325,14 @@ def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray
     step = Step(
         np.zeros(size), np.zeros(size), np.zeros((2, size)), np.zeros(2), np.zeros(2),
         np.zeros((3, most)), np.zeros((2, most)), np.zeros((2, most)), np.zeros((4, count)),
-        np.zeros(count), np.zeros(CONTEXT), np.zeros(MEMORY), np.zeros((2, MEMORY)),
-        np.zeros(2), np.zeros((3, 4, size)), np.zeros(size), np.zeros(size), np.zeros(2),
-        np.zeros(4), np.zeros((3, most)), np.zeros((3, most)), np.zeros(most))
+        np.zeros(count), np.zeros(count), np.zeros(CONTEXT), np.zeros(MEMORY),
+        np.zeros((2, MEMORY)), np.zeros(2), np.zeros((3, 4, size)), np.zeros(size),
+        np.zeros(size), np.zeros(2), np.zeros(4), np.zeros((3, most)), np.zeros((3, most)),
+        np.zeros(most))
     block = Block(
         np.zeros(LANES), np.zeros((n + 2 + most, LANES)), np.zeros((n, LANES)),
         np.zeros((2, LANES)), np.zeros((ROWS, LANES)), np.zeros((4, LANES)))
     drive = Drive(np.zeros(2), np.zeros(2), np.zeros(2), np.full(2, np.inf), np.zeros(2),
                   np.zeros(1, dtype=np.int64))
     return _follow(s, stamps, values, times, places, out, end, fine, plant, step, block, drive,
-                   np.zeros(4), np.zeros(4), np.zeros(4), s[:n], s[n + 7:n + 11])
+                   np.zeros(4), np.zeros(4), np.zeros(4), s[:n], s[n + 7:n + SHAPED])

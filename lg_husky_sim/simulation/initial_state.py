@@ -8,7 +8,7 @@ from functools import cached_property
 
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose
-from lg_husky_sim.simulation.event_kernel import TAIL
+from lg_husky_sim.simulation.event_kernel import SHAPED, TAIL, WANTED
 import numpy as np
 
 
@@ -76,9 +76,10 @@ class InitialStates:
         if command is not None:
             late = self._plant.late(np.array([time]), np.array([pose.x]))[0]
             limit = self._plant.sets[-1 if late else 0].command
-            flat[n + 11] = max(-limit.limit_forward, min(limit.limit_forward, command.forward))
-            flat[n + 12] = max(-limit.limit_yaw, min(limit.limit_yaw, command.yaw))
-            flat[n + 13:] = command.forward, command.yaw
+            flat[n + SHAPED] = max(-limit.limit_forward,
+                                   min(limit.limit_forward, command.forward))
+            flat[n + SHAPED + 1] = max(-limit.limit_yaw, min(limit.limit_yaw, command.yaw))
+            flat[n + WANTED:] = command.forward, command.yaw
         return flat
 
     def rates_without_slip(self, twist: BodyTwist) -> tuple[float, float]:

@@ -6,15 +6,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lg_husky_sim.husky.laws import Law
+from lg_husky_sim.husky.laws import REMEMBERING
 from lg_husky_sim.husky.plant import PlantSet
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 #: Bits of a number's mantissa that count; the graph's algebra rounds the last ones.
 _BITS = 44
-#: Laws that advance a memory each time they are met: never merged.
-_REMEMBERING = (Law.HEATING, Law.BACKLASH)
 
 
 def _rounded(values: FloatArray) -> FloatArray:
@@ -52,7 +50,7 @@ def merged(plant: PlantSet) -> PlantSet:
     home: list[int] = []
     for effort, law in enumerate(plant.laws.tolist()):
         own = slice(plant.offsets[effort], ends[effort])
-        alone = effort if law in _REMEMBERING else -1
+        alone = effort if law in REMEMBERING else -1
         key = (law, alone, coefficients[effort].tobytes(), rows[own].tobytes())
         if key not in place:
             place[key] = len(kept)

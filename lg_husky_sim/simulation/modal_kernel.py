@@ -35,8 +35,9 @@ class Packed(NamedTuple):
     stages : numpy.ndarray, shape (n_sets, 8)
         Latency [s], slew forward and yaw [m/s², rad/s²], limit forward and yaw [m/s, rad/s],
         volts per speed and per yaw rate [V·s/m, V·s/rad], clamp [V] (0: none).
-    counts : numpy.ndarray, shape (n_sets, 6)
-        Real modes, pairs, efforts; whether efforts need the pose, a memory, the voltages.
+    counts : numpy.ndarray, shape (n_sets, 7)
+        Real modes, pairs, efforts; whether efforts need the pose, a memory, the voltages, what
+        their arguments add up to.
     rates : numpy.ndarray, shape (n_sets, n_modes)
         Of the modes [1/s].
     out_of, into : numpy.ndarray, shapes (n_sets, n, n_modes), (n_sets, n_modes, n)

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 from lg_husky_sim.husky.effects import OnsetKind
-from lg_husky_sim.husky.laws import Law, WIDTH
+from lg_husky_sim.husky.laws import CONTEXTUAL, Law, REMEMBERING, WIDTH
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.merging import merged
@@ -28,8 +28,6 @@ NOTHING = 1e-15
 ROWS = 11
 _LANES = 4
 _ONSETS = {OnsetKind.TIME: 1.0, OnsetKind.PLACE_ABOVE: 2.0, OnsetKind.PLACE_BELOW: 3.0}
-_CONTEXTUAL = (Law.HEADING, Law.WHEEL_PHASE, Law.TABLE)
-_REMEMBERING = (Law.HEATING, Law.BACKLASH)
 _Numbers = TypeVar('_Numbers', NDArray[np.float64], NDArray[np.int64])
 
 
@@ -190,8 +188,8 @@ def packed(plant: Plant) -> Packed:
     for one, mode in zip(sets, modes, strict=True):
         rows, rows_u, rows_f = _rows(one)
         laws = set(one.laws.tolist())
-        needs = (not laws.isdisjoint(_CONTEXTUAL), not laws.isdisjoint(_REMEMBERING),
-                 bool(one.k.any()))
+        needs = (not laws.isdisjoint(CONTEXTUAL), not laws.isdisjoint(REMEMBERING),
+                 bool(one.k.any()), Law.STICTION in laws)
         counts = np.array([mode.n_real, mode.n_pairs, one.laws.size, *needs], dtype=np.int64)
         pieces: list[NDArray[np.generic]] = [
             np.array(_stage(one.command)), counts, _padded(mode.rates, (size,)),

@@ -26,12 +26,10 @@ ENTRIES = {name: entry for section, entries in SETTINGS.items() if section != 's
            for name, entry in entries.items()}
 #: Sizes of arrays, layouts and identities: no physics and no statistics.
 LAYOUT = {'STATES', 'BALANCES', 'NEUTRAL', 'LEAST_CHANCE'}
-#: Who may name an effect, and which; wording and what a person should drive are free to.
+#: Who may name an effect, and which: a wording.
 NAMED = {
     'conclusion.py': {'yaw_pull'},
-    'selection/onsets.py': {'belt_compliance', 'speed_loop'},
     'wording.py': {'sensor_time_offset'},
-    'separation.py': set(catalogue()),
 }
 
 

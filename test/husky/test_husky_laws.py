@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from lg_husky_sim.husky.laws import CONTEXT, evaluate, EXPRESSIONS, Law, MEMORY, WIDTH
+from lg_husky_sim.husky.laws import CONTEXT, evaluate, EXPRESSIONS, HELD, Law, MEMORY, WIDTH
 from lg_husky_sim.linear_graph.expressions import compile_tuple, GLOBALS
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -17,11 +17,11 @@ COEFFICIENTS = {
     Law.COULOMB: 4, Law.QUADRATIC: 1, Law.WHILE_MOVING: 2, Law.MODULATED_DAMPING: 1,
     Law.HEADING: 2, Law.WHEEL_PHASE: 4, Law.SLIP_SATURATION: 2, Law.CURRENT_LIMIT: 3,
     Law.DEAD_ZONE: 1, Law.DEAD_BAND: 2, Law.CLIP: 1, Law.BUS_SAG: 2, Law.DROOP: 2,
-    Law.HEATING: 3, Law.BACKLASH: 3, Law.FRICTION_CIRCLE: 3,
+    Law.HEATING: 3, Law.BACKLASH: 3, Law.FRICTION_CIRCLE: 3, Law.STICTION: 5,
 }
 ARGUMENTS = {Law.MODULATED_DAMPING: 2, Law.CURRENT_LIMIT: 2, Law.BUS_SAG: 4, Law.BACKLASH: 3,
-             Law.FRICTION_CIRCLE: 2}
-SIDED = (Law.WHEEL_PHASE, Law.HEATING, Law.BACKLASH)
+             Law.FRICTION_CIRCLE: 2, Law.STICTION: 2}
+SIDED = (Law.WHEEL_PHASE, Law.HEATING, Law.BACKLASH, Law.STICTION)
 
 
 def opcode(law: int, coefficients: FloatArray, z: FloatArray, context: FloatArray | None = None,
@@ -64,7 +64,7 @@ def test_expression_and_opcode_agree(law: Law) -> None:
         rate = z[0] / p[1] - z[1] if law == Law.BACKLASH else 1.0
         left = 0.5 * p[0] - math.copysign(1.0, rate) * memory[2 + side]
         signals = {'time': context[0], 'heading': context[1], 'angle': context[4 + side],
-                   'heat': memory[side],
+                   'heat': memory[side], 'held': memory[HELD + side],
                    'in_play': max(0.0, min(1.0, left / (abs(rate) * context[6])))}
         got = opcode(law, p, z, context, memory, before=int(generator.integers(3)))
         assert got == pytest.approx(expression(law, p, z, **signals), rel=1e-12, abs=1e-13)

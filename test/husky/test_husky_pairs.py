@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
+from lg_husky_sim.husky.effects import always_on, catalogue, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model, Drivetrain, Structure
 from lg_husky_sim.husky.model_file import (
     load_model,
@@ -26,7 +26,7 @@ import pytest
 EFFECTS = [Effect(name, side, shape) for name, kind in catalogue().items()
            for side in kind.sides for shape in kind.shapes]
 """The whole catalogue."""
-ALWAYS = ('belt_compliance', 'speed_loop')
+ALWAYS = always_on()
 """Effects that add states, which an onset cannot."""
 PARTNERS = 2
 """Of each effect."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
-from lg_husky_sim.husky.laws import CONTEXT, evaluate, Law, MEMORY
+from lg_husky_sim.husky.laws import CONTEXT, evaluate, MEMORY, REMEMBERING
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.simulation.merging import merged
 from lg_husky_sim.simulation.modes import packed
@@ -16,7 +16,8 @@ import pytest
 
 Maker = Callable[..., Plant]
 #: Effects that may begin late; a slope has no argument, so that nothing at all is allocated.
-BEGINNING = sorted(name for name in catalogue() if name != 'speed_loop')
+BEGINNING = sorted(name for name, kind in catalogue().items()
+                   if not kind.always_on or kind.drivetrain)
 
 
 @pytest.mark.parametrize('name', BEGINNING)
@@ -29,5 +30,4 @@ def test_padding_reads_nothing_and_adds_nothing(robot: Maker, name: str) -> None
         z, memory, out = np.full(8, np.nan), np.full(MEMORY, np.nan), np.full(efforts, 7.0)
         evaluate(c, laws, coefficients, offsets, z, np.ones(CONTEXT), memory, out)
         np.testing.assert_array_equal(out[own:], 0.0)
-        remembering = (Law.HEATING, Law.BACKLASH)
-        assert not np.any(np.isin(laws[c, own:], remembering))
+        assert not np.any(np.isin(laws[c, own:], REMEMBERING))

@@ -26,9 +26,6 @@ from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Effects that add states cannot begin late.
-_ALWAYS_ON = ('belt_compliance', 'speed_loop')
-
 
 def onsets_of(evidence: Evidence) -> list[Onset]:
     """Return where an effect may begin, on a coarse grid of times and places."""
@@ -101,7 +98,7 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
                     at = hypothesis.at(onset)
                     best = Look(at, begin(at, group, coefficients), gain)
         return best
-    open_ones = [h for h in pool if h.effect.id not in _ALWAYS_ON and h.effect.shape != 'grip']
+    open_ones = [h for h in pool if not h.effect.kind.always_on and h.effect.shape != 'grip']
     return [one for one in evidence.pool.map(best_of, open_ones) if one is not None]
 
 

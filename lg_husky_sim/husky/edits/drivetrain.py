@@ -1,0 +1,77 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects of gears, axles and belts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.husky.edits.network import (
+    axles,
+    branch_of,
+    Edit,
+    EditedNetwork,
+    LawRow,
+    MOTORS,
+    Stage,
+    WHEELS,
+)
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.laws import Law
+from lg_husky_sim.linear_graph import Branch, Kind
+
+
+def _belt(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    if all(branch.name != 'K_BeltL' for branch in network.graph.branches):
+        raise ParameterError(
+            f'effect {effect.id} needs the expanded drivetrain (structure.drivetrain)')
+    return network
+
+
+def _asymmetry(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    if effect.shape == 'slip':
+        # Whatever changed these tyres before, such as the ground, goes on.
+        return network.with_values({
+            f'B_{wheel}': f'({branch_of(network.graph, f"B_{wheel}").value})*(1+damping_change)'
+            for wheel in WHEELS[effect.side]})
+    letter, inertia = axles(network.graph, effect.side)[0]
+    bearing = Branch(f'B_bearing_{letter}', Kind.D_TYPE, inertia.domain, inertia.tail,
+                     inertia.head, 'extra_damping')
+    return replace(network, graph=network.graph.with_branches(bearing))
+
+
+def _on_axles(describe: Callable[[str, float, str], tuple[LawRow, tuple[str, ...]]]) -> Edit:
+    # A law on the axles of a side, from the number of its motor, its place and the axle's rate.
+    def apply(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+        motors = {letter: (number, side) for number, letter, side, _ in MOTORS}
+        for letter, inertia in axles(network.graph, effect.side):
+            number, side = motors[letter]
+            row, of = describe(number, side, f'omega({inertia.name})')
+            network = network.with_effort_on(f'T_{effect.id}_{letter}', inertia, row, *of)
+        return network
+    return Edit(apply)
+
+
+def _dry(number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
+    row = LawRow(Law.COULOMB, ('dry_torque', 'dry_speed', 'breakaway_share', 'breakaway_speed'))
+    return row, (rate,)
+
+
+def _ripple(number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
+    return LawRow(Law.WHEEL_PHASE, ('ripple_cos', 'ripple_sin', side, 'ripple_speed')), (rate,)
+
+
+def _play(number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
+    row = LawRow(Law.BACKLASH, ('play', 'torque_constant*gear_ratio', side))
+    return row, (f'V(V_S{number})', rate, f'i(L_{number})')
+
+
+EDITS = {
+    'belt_compliance': Edit(_belt),
+    'viscous_asymmetry': Edit(_asymmetry, Stage.VALUES),
+    'coulomb_drivetrain': _on_axles(_dry),
+    'torque_ripple': _on_axles(_ripple),
+    'gear_backlash': _on_axles(_play),
+}
