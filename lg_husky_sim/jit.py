@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import functools
 import importlib.util
 import os
 from pathlib import Path
-from typing import Any, TypeVar
+import threading
+from typing import Any, cast, TypeVar
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
@@ -23,58 +25,154 @@ def compiled() -> bool:
     return importlib.util.find_spec('numba') is not None
 
 
-def jit(function: Function) -> Function:
+class Kernel:
     """
-    Compile ``function`` on first call, caching the machine code on disk.
+    A function that becomes machine code when it is first called.
 
-    Without fast-math: every operation is IEEE, in the order in which it is written, so that the
-    compiled and the plain function give the same numbers.
+    Numba is imported then, not before: a program that ends without a simulation never waits for
+    it.
+
+    Parameters
+    ----------
+    function : callable
+        Without fast-math: every operation is IEEE, in the order in which it is written, so that
+        the compiled and the plain function give the same numbers.
     """
-    return _compiled(function, {})
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+        #: The function in plain Python, with the parts that it calls.
+        self.plain = function
+        self._machine: Any = None
+        self._postponed = False
+        self._seen: tuple[Any, ...] = ()
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the machine code, or plain Python while :meth:`soon` waits for it."""
+        if self._postponed:
+            self._seen = self._seen or arguments
+            return self.plain(*arguments)
+        machine = self._machine or self._made()
+        return machine(*arguments)
+
+    def on_disk(self) -> bool:
+        """Return whether there is machine code on disk, as far as can be told without a call."""
+        return any(_index_files(self._made(), self.plain))
+
+    def soon(self, elsewhere: Callable[[], object]) -> threading.Event:
+        """
+        Let calls run in plain Python until machine code has been put on disk.
+
+        Parameters
+        ----------
+        elsewhere : callable
+            Does that, in a thread of its own. Where it could not, the thread compiles.
+
+        Returns
+        -------
+        threading.Event
+            Set from when on calls run in machine code.
+        """
+        self._postponed, done = True, threading.Event()
+
+        def load() -> None:
+            import numba
+            try:
+                elsewhere()
+                if self._seen:
+                    self._made().compile(tuple(map(numba.typeof, self._seen)))
+            finally:
+                self._postponed, self._seen = False, ()
+                done.set()
+
+        threading.Thread(target=load, daemon=True, name='machine code').start()
+        return done
+
+    @property
+    def _numba_type_(self) -> Any:
+        # What numba asks of an object that it meets where it compiles another function.
+        return (self._machine or self._made())._numba_type_
+
+    def _made(self) -> Any:
+        import numba
+        with _MAKING:
+            if self._machine is None:
+                while _PARTS:
+                    part, options = _PARTS.pop()
+                    machine = numba.njit(**_known(options))(part)
+                    # The type only has a weak reference.
+                    part.__dict__.update(_machine=machine, _numba_type_=machine._numba_type_)
+                made = numba.njit(cache=True, nogil=True, error_model='numpy')(self.plain)
+                if _SOURCES:
+                    forget_outdated(_index_files(made, self.plain),
+                                    max(path.stat().st_mtime for path in _SOURCES))
+                self._machine = made
+        return self._machine
+
+
+def jit(function: Function) -> Function:
+    """Return a function as a :class:`Kernel` where numba is used, and else as it is."""
+    if not compiled():
+        return function
+    _remember_source(function)
+    return cast(Function, Kernel(function))
 
 
 def jit_part(function: Function) -> Function:
     """
-    Compile a function that compiled ones call in their inner loop, as :func:`jit` does.
+    Return a function as it is, and let kernels compile it into their own code.
 
-    It must not allocate, slice or return an array: its code goes into its callers', and its
-    arrays are not counted, which takes an atomic increment and decrement for each one and call.
+    It must not allocate, slice or return an array: its arrays are not counted, which takes an
+    atomic increment and decrement for each one and call.
     """
-    return _compiled(function, {'_nrt': False, 'forceinline': True})
+    return _part(function, {'forceinline': True})
 
 
 def jit_call(function: Function) -> Function:
     """
-    Compile a function that compiled ones call from several places, as :func:`jit_part` does.
+    Let kernels call a function's machine code, as :func:`jit_part` does.
 
-    Its code stays by itself, which compiles faster and runs nearly as fast.
+    Its code stays by itself, which compiles faster where it is called from several places.
     """
-    return _compiled(function, {'_nrt': False})
+    return _part(function, {})
 
 
-def _compiled(function: Function, options: dict[str, bool]) -> Function:
-    if not compiled():
-        return function
-    import numba
+def _part(function: Function, options: dict[str, Any]) -> Function:
+    if compiled():
+        _remember_source(function)
+        _PARTS.append((function, options))
+    return function
+
+
+def _known(options: dict[str, Any]) -> dict[str, Any]:
+    # Options of a part; it is never called from Python, and shares no machine code but by its
+    # callers. Not all are public: a numba without them only makes slower code, or more of it.
     from numba.core.options import DefaultOptions
+    wanted = {'_nrt': False, 'no_cpython_wrapper': True, 'no_cfunc_wrapper': True, **options}
+    return {'nogil': True, 'error_model': 'numpy',
+            **{name: value for name, value in wanted.items() if hasattr(DefaultOptions, name)}}
 
-    # '_nrt' is no public option: a numba that no longer has it only makes slower code.
-    known = {name: value for name, value in options.items() if hasattr(DefaultOptions, name)}
-    wrapped = numba.njit(cache=True, nogil=True, error_model='numpy', **known)(function)
+
+def _remember_source(function: Callable[..., Any]) -> None:
     source = Path(function.__code__.co_filename)
     if source.is_file():
         _SOURCES.add(source)
-        forget_outdated(Path(wrapped.stats.cache_path), f'{source.stem}.{function.__name__}-',
-                        max(path.stat().st_mtime for path in _SOURCES))
-    compiled_function: Function = wrapped
-    return compiled_function
 
 
-#: Files of the compiled functions so far. What a function calls was compiled before it.
+#: Parts that no kernel has been compiled with so far, and how they are to be compiled.
+_PARTS: list[tuple[Callable[..., Any], dict[str, Any]]] = []
+_MAKING = threading.RLock()
+#: Files of kernels and parts so far. What a kernel calls was imported before it is called.
 _SOURCES: set[Path] = set()
 
 
-def forget_outdated(folder: Path, beginning: str, newest: float) -> None:
+def _index_files(made: Any, function: Callable[..., Any]) -> list[Path]:
+    # Those of numba's cache for a function.
+    beginning = f'{Path(function.__code__.co_filename).stem}.{function.__name__}-'
+    return list(Path(made.stats.cache_path).glob(f'{beginning}*.nbi'))
+
+
+def forget_outdated(indices: list[Path], newest: float) -> None:
     """
     Remove machine code that is older than a source.
 
@@ -83,14 +181,12 @@ def forget_outdated(folder: Path, beginning: str, newest: float) -> None:
 
     Parameters
     ----------
-    folder : Path
-        Of the cache.
-    beginning : str
-        Of the names of its index files.
+    indices : list of pathlib.Path
+        Index files of the cache.
     newest : float
         Time of the last change of a source [s since the epoch].
     """
-    for index in folder.glob(f'{beginning}*.nbi'):
+    for index in indices:
         try:
             if index.stat().st_mtime <= newest:
                 index.unlink()

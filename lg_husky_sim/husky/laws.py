@@ -17,6 +17,8 @@ import math
 
 from lg_husky_sim.jit import jit_part
 from lg_husky_sim.signals import FloatArray
+import numpy as np
+from numpy.typing import NDArray
 
 #: Coefficients that a row can hold.
 WIDTH = 24
@@ -178,8 +180,9 @@ def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int
 
 
 @jit_part
-def evaluate(c: int, laws: FloatArray, coefficients: FloatArray, offsets: FloatArray,
-             z: FloatArray, context: FloatArray, memory: FloatArray, out: FloatArray) -> None:
+def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
+             offsets: NDArray[np.int64], z: FloatArray, context: FloatArray, memory: FloatArray,
+             out: FloatArray) -> None:
     """
     Evaluate every effort.
 

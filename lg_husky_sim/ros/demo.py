@@ -19,8 +19,8 @@ from lg_husky_sim.ros import api
 from lg_husky_sim.ros.recorder import NAME, recorded_topics, Recorder
 from lg_husky_sim.ros.settings import Settings
 
-#: Longest wait for the first odometry [s]; the first start compiles for most of a minute, and
-#: on a busy machine for some.
+#: Longest wait for the first odometry [s]; a plant with many effects waits for the kernel to be
+#: compiled for the first time, for most of a minute, and on a busy machine for some.
 _START = 300.0
 #: Recorded after the driver has ended, until the robot has come to rest [s].
 _AFTER = 1.0

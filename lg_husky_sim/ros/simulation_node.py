@@ -9,7 +9,6 @@ import math
 import time
 from typing import Any
 
-from lg_husky_sim.jit import compiled
 from lg_husky_sim.ros import conversions
 from lg_husky_sim.ros.api import describe_backend, message_type, Node, steady_timer
 from lg_husky_sim.ros.clockwork import Clockwork
@@ -23,6 +22,7 @@ from lg_husky_sim.ros.parameters import declare_settings, LiveSettings
 from lg_husky_sim.ros.settings import Settings
 from lg_husky_sim.ros.standard_control import StandardControl
 from lg_husky_sim.signals import BodyTwist, Pose
+from lg_husky_sim.simulation.compiling import make_ready
 
 _SECOND = 1_000_000_000
 #: Shortest time between two looks at the clock [s]; above it, steps come in bunches.
@@ -31,6 +31,9 @@ _TICK = 0.001
 _BUNCH = 20_000_000
 #: Time between two messages on /clock while paused, for who joins late [ns].
 _REMINDER = 200_000_000
+#: Part of the time between two steps that one may take in plain Python while the kernel is
+#: compiled for the first time.
+_PLAIN = 0.5
 
 
 class SimNode(Node):
@@ -78,9 +81,10 @@ class SimNode(Node):
             lambda: int(self.get_clock().now().nanoseconds), self._follows_clock,
             lambda text: log.warning(text, throttle_duration_sec=1.0))
         # Who waits for the first odometry expects the robot to answer from then on.
-        if compiled():
-            log.info('loading the kernel; the first start compiles it, for a minute or so')
-        self._warm_up()
+        if make_ready(Engine(self.settings).step, _PLAIN / (
+                self.settings.rate * (self.settings.speed or 1.0))):
+            log.info('the kernel is compiled in the background for the first time; until then '
+                     'steps are made without it, and take longer')
         self._publish()
         self._live = LiveSettings(self, self.settings, self._apply)
         self._subscribe()
@@ -104,11 +108,6 @@ class SimNode(Node):
         self.create_subscription(
             message_type('geometry_msgs/msg/PoseWithCovarianceStamped'), one.initial_pose_topic,
             self._on_initial_pose, 10)
-
-    def _warm_up(self) -> None:
-        # The first step compiles or loads machine code.
-        spare = Engine(self.settings)
-        spare.step()
 
     # --- commands ---------------------------------------------------------------------------
 

@@ -10,12 +10,48 @@ middle and end are found by iteration. What the laws differ from it at a quarter
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from lg_husky_sim.husky.laws import evaluate, GAPS, HELD
+from lg_husky_sim.husky.laws import MEMORY as MEMORIES
 from lg_husky_sim.jit import jit_part
 from lg_husky_sim.signals import FloatArray
-from lg_husky_sim.simulation.modal_kernel import add_product, advance, doubled, Packed, phis
+from lg_husky_sim.simulation.arrays import (
+    ADDING,
+    BEND,
+    CHANGE,
+    CONTEXT,
+    DU,
+    EFFORTS,
+    F,
+    FED,
+    FORCE,
+    FORMER,
+    GAINS,
+    INPUTS,
+    INSIDE,
+    KEPT,
+    MEMORY,
+    MOTION,
+    NEW,
+    NOW,
+    OLD,
+    Packed,
+    PAIRS,
+    PARABOLA,
+    PART,
+    PHI,
+    POSED,
+    QUARTER,
+    REALS,
+    REMEMBERING,
+    SLOPE,
+    SWEPT,
+    TANGENT,
+    U,
+    U_INSIDE,
+    Work,
+)
+from lg_husky_sim.simulation.modal_kernel import advance, doubled, phis
 
 #: Error of a step that is allowed: wheel rates [rad/s], speed [m/s], yaw rate [rad/s].
 WHEEL_ERROR, SPEED_ERROR, YAW_ERROR = 2e-5, 3e-6, 5e-6
@@ -29,194 +65,174 @@ AWAY = 3.0
 STEEPEST, FLATTEST = -50.0, 0.5
 
 
-class Step(NamedTuple):
-    """
-    Arrays of a step: modes ``xi``, ``r`` and ``q`` of :mod:`modal_kernel`, and its efforts.
-
-    ``f`` has the efforts at the start, the middle and the end in rows, ``parabola`` the other
-    coefficients of the parabola through them, ``former`` those of the step before. ``z`` has the
-    laws' arguments at those three places and at a quarter, ``swept`` their integrals, ``kept`` the
-    memories at the middle and the end; in ``p``, ``change`` and ``old`` are a quarter, the middle
-    and the end.
-    """
-
-    xi: FloatArray
-    r: FloatArray
-    q: FloatArray
-    u: FloatArray
-    du: FloatArray
-    f: FloatArray
-    parabola: FloatArray
-    former: FloatArray
-    z: FloatArray
-    line: FloatArray
-    swept: FloatArray
-    context: FloatArray
-    now: FloatArray
-    kept: FloatArray
-    tangent: FloatArray
-    p: FloatArray
-    xt: FloatArray
-    work: FloatArray
-    ut: FloatArray
-    four: FloatArray
-    change: FloatArray
-    old: FloatArray
-    new: FloatArray
-
-
 @jit_part
-def effect(plant: Packed, c: int, step: Step, row: int, node: int, t: float) -> float:
+def effect(plant: Packed, c: int, work: Work, row: int, p: int, t: float) -> float:
     """
     Return what a change of the efforts (a row) over ``t`` [s] does, in parts of what is allowed.
 
-    ``node`` is the row of the phis for ``t``.
+    The phis for ``t`` are in the rows of the modes from ``p`` on.
     """
-    n_real, n_pairs, efforts = plant.counts[c, 0], plant.counts[c, 1], plant.counts[c, 2]
-    work, p = step.work, step.p
-    for i in range(work.size):
-        work[i] = 0.0
-    for e in range(efforts):
-        value = t * step.change[row, e]
-        for i in range(work.size):
-            work[i] += plant.gm[c, e, i] * value
+    n_real, n_pairs = plant.counts[c, REALS], plant.counts[c, PAIRS]
+    modal, modes = plant.modal, work.modes
+    size = modes.shape[1]
+    for i in range(size):
+        modes[FORCE, i] = 0.0
+    for e in range(plant.counts[c, EFFORTS]):
+        value = t * work.efforts[row, e]
+        for i in range(size):
+            modes[FORCE, i] += modal[c, GAINS + e, i] * value
     for i in range(n_real):
-        work[i] *= p[node, 0, i]
+        modes[FORCE, i] *= modes[p, i]
     for i in range(n_real, n_real + n_pairs):
         m = i + n_pairs
-        real = p[node, 0, i] * work[i] - p[node, 0, m] * work[m]
-        work[m] = p[node, 0, i] * work[m] + p[node, 0, m] * work[i]
-        work[i] = real
+        real = modes[p, i] * modes[FORCE, i] - modes[p, m] * modes[FORCE, m]
+        modes[FORCE, m] = modes[p, i] * modes[FORCE, m] + modes[p, m] * modes[FORCE, i]
+        modes[FORCE, i] = real
     left, right, speed, rate = 0.0, 0.0, 0.0, 0.0
-    for i in range(plant.ci.shape[2]):
-        left += plant.ci[c, 0, i] * work[i]
-        right += plant.ci[c, 1, i] * work[i]
-        speed += plant.ci[c, 2, i] * work[i]
-        rate += plant.ci[c, 3, i] * work[i]
+    for i in range(size):
+        left += modal[c, MOTION, i] * modes[FORCE, i]
+        right += modal[c, MOTION + 1, i] * modes[FORCE, i]
+        speed += modal[c, MOTION + 2, i] * modes[FORCE, i]
+        rate += modal[c, MOTION + 3, i] * modes[FORCE, i]
     return max(max(abs(left), abs(right)) / WHEEL_ERROR,
                max(abs(speed) / SPEED_ERROR, abs(rate) / YAW_ERROR))
 
 
 @jit_part
-def memories(plant: Packed, c: int, begin: FloatArray, z: FloatArray, swept: FloatArray,
-             node: int, step: float, now: FloatArray) -> None:
+def memories(plant: Packed, c: int, z: FloatArray, node: int, step: float, few: FloatArray
+             ) -> None:
     """
-    Put the memories after ``step`` [s] into ``now``: at the middle (0) or the end (1).
+    Put the memories after ``step`` [s] into the row NOW: at the middle (1) or the end (2).
 
-    ``swept`` has the integrals of the laws' arguments, where a law needs them exactly: what is
-    held at rest would creep with the error of a mean.
+    The row SWEPT has the integrals of the laws' arguments, where a law needs them exactly: what
+    is held at rest would creep with the error of a mean.
     """
-    for i in range(begin.size):
-        now[i] = begin[i]
-    for j in range(plant.counts[c, 2]):
+    for i in range(MEMORIES):
+        few[NOW, i] = few[MEMORY, i]
+    for j in range(plant.counts[c, EFFORTS]):
         o = plant.offsets[c, j]
         p0, p1 = plant.coefficients[c, j, 0], plant.coefficients[c, j, 1]
         side = int(plant.coefficients[c, j, 2])
         if plant.laws[c, j] == 13:
             mean = 0.5 * (z[0, o] ** 2 + z[1, o] ** 2)
-            if node == 1:
+            if node == 2:
                 mean = (z[0, o] ** 2 + 4.0 * z[1, o] ** 2 + z[2, o] ** 2) / 6.0
-            now[side] = begin[side] * math.exp(-step / p1) + step * mean
+            few[NOW, side] = few[MEMORY, side] * math.exp(-step / p1) + step * mean
         elif plant.laws[c, j] == 14:
             mean = 0.5 * (z[0, o] / p1 - z[0, o + 1] + z[1, o] / p1 - z[1, o + 1])
-            if node == 1:
+            if node == 2:
                 mean = (z[0, o] / p1 - z[0, o + 1] + 4.0 * (z[1, o] / p1 - z[1, o + 1])
                         + z[2, o] / p1 - z[2, o + 1]) / 6.0
-            now[GAPS + side] = max(-0.5 * p0, min(0.5 * p0, begin[GAPS + side] + step * mean))
+            few[NOW, GAPS + side] = max(-0.5 * p0, min(
+                0.5 * p0, few[MEMORY, GAPS + side] + step * mean))
         elif plant.laws[c, j] == 17:
-            share = z[node + 1, o + 1] / plant.coefficients[c, j, 3]
+            share = z[node, o + 1] / plant.coefficients[c, j, 3]
             limit = p1 * math.exp(-share * share)
-            now[HELD + side] = max(-limit, min(limit, begin[HELD + side] + swept[o]))
+            few[NOW, HELD + side] = max(-limit, min(
+                limit, few[MEMORY, HELD + side] + z[SWEPT, o]))
 
 
 @jit_part
-def arguments(plant: Packed, c: int, row: int, xi: FloatArray, u: FloatArray, z: FloatArray,
-              line: FloatArray) -> None:
-    """Put the laws' arguments at modes and voltages into ``line`` and a row of ``z``."""
-    for i in range(line.size):
-        line[i] = 0.0
-    add_product(plant.hm, c, xi, xi.size, line)
-    if plant.counts[c, 5]:
-        add_product(plant.k, c, u, 2, line)
-    for i in range(line.size):
-        z[row, i] = line[i]
+def _read_arguments(plant: Packed, c: int, work: Work, row: int) -> None:
+    # Put the laws' arguments at the modes and voltages inside a step into a row of them; what
+    # modes add up to, without voltages, into SWEPT.
+    z, size = work.arguments, work.modes.shape[1]
+    count = z.shape[1]
+    for i in range(count):
+        z[row, i] = 0.0
+    for j in range(size):
+        value = work.modes[INSIDE, j]
+        for i in range(count):
+            z[row, i] += plant.readings[c, j, i] * value
+    if plant.counts[c, FED] and row != SWEPT:
+        for j in range(2):
+            value = work.few[U_INSIDE, j]
+            for i in range(count):
+                z[row, i] += plant.readings[c, size + j, i] * value
 
 
 @jit_part
-def surroundings(context: FloatArray, time: float, s: FloatArray, n: int, four: FloatArray,
-                 tangent: FloatArray) -> None:
-    """Put time, heading, x, y and angles after the integrals ``four`` of a step in context."""
-    context[0] = time
-    context[1] = s[n + 3] + four[3]
+def _surroundings(s: FloatArray, n: int, few: FloatArray) -> None:
+    # Put heading, x, y and angles after the integrals of a part of a step into the context.
+    four = few[PART]
+    few[CONTEXT, 1] = s[n + 3] + four[3]
     half = 0.5 * four[3]
     c, d = math.cos(half), math.sin(half)
-    context[2] = s[n + 4] + four[2] * (tangent[0] * c - tangent[1] * d)
-    context[3] = s[n + 5] + four[2] * (tangent[1] * c + tangent[0] * d)
-    context[4] = s[n] + four[0]
-    context[5] = s[n + 1] + four[1]
+    few[CONTEXT, 2] = s[n + 4] + four[2] * (few[TANGENT, 0] * c - few[TANGENT, 1] * d)
+    few[CONTEXT, 3] = s[n + 5] + four[2] * (few[TANGENT, 1] * c + few[TANGENT, 0] * d)
+    few[CONTEXT, 4] = s[n] + four[0]
+    few[CONTEXT, 5] = s[n + 1] + four[1]
 
 
 @jit_part
-def _efforts_at(plant: Packed, c: int, s: FloatArray, n: int, time: float, at: float, node: int,
-                step: Step, memory: FloatArray) -> None:
-    # Evaluate the laws at a quarter (node 0), the middle (1) or the end (2) into step.new.
-    n_real, n_pairs = plant.counts[c, 0], plant.counts[c, 1]
-    advance(at, 0, step.xi, step.r, step.q, step.p, node, n_real, n_pairs, step.xt)
-    step.ut[0], step.ut[1] = step.u[0] + at * step.du[0], step.u[1] + at * step.du[1]
-    arguments(plant, c, node if node > 0 else 3, step.xt, step.ut, step.z, step.line)
-    step.context[0] = time + at
-    if plant.counts[c, 3]:
-        advance(at, 1, step.xi, step.r, step.q, step.p, node, n_real, n_pairs, step.xt)
-        for o in range(4):
-            step.four[o] = 0.0
-            for i in range(plant.ci.shape[2]):
-                step.four[o] += plant.ci[c, o, i] * step.xt[i]
-        surroundings(step.context, time + at, s, n, step.four, step.tangent)
-    if plant.counts[c, 4]:
+def efforts_at(plant: Packed, c: int, s: FloatArray, n: int, time: float, at: float, node: int,
+               row: int, work: Work) -> None:
+    """
+    Evaluate the laws inside a step into the row NEW, ``at`` [s] after its start.
+
+    ``node`` counts the phis: for a quarter of the step, its middle and its end; ``row`` of the
+    arguments receives those of the laws. At the start, all of it is zero.
+    """
+    n_real, n_pairs = plant.counts[c, REALS], plant.counts[c, PAIRS]
+    modes, few, modal = work.modes, work.few, plant.modal
+    few[U_INSIDE, 0] = few[U, 0] + at * few[DU, 0]
+    few[U_INSIDE, 1] = few[U, 1] + at * few[DU, 1]
+    few[CONTEXT, 0] = time + at
+    for first in range(1 + max(plant.counts[c, POSED], plant.counts[c, ADDING])):
+        advance(at, first, modes, PHI + 4 * node, n_real, n_pairs)
+        if first == 0:
+            _read_arguments(plant, c, work, row)
+        elif plant.counts[c, POSED]:
+            for o in range(4):
+                few[PART, o] = 0.0
+                for i in range(modes.shape[1]):
+                    few[PART, o] += modal[c, MOTION + o, i] * modes[INSIDE, i]
+            _surroundings(s, n, few)
+        if first == 1 and plant.counts[c, ADDING]:
+            _read_arguments(plant, c, work, SWEPT)
+    remembered = MEMORY
+    if plant.counts[c, REMEMBERING] and at > 0.0:
+        remembered = NOW
         if node > 0:
-            if plant.counts[c, 6]:
-                if not plant.counts[c, 3]:
-                    advance(at, 1, step.xi, step.r, step.q, step.p, node, n_real, n_pairs,
-                            step.xt)
-                for i in range(step.swept.size):
-                    step.swept[i] = 0.0
-                add_product(plant.hm, c, step.xt, step.xt.size, step.swept)
-            memories(plant, c, memory, step.z, step.swept, node - 1, at, step.now)
-        for i in range(memory.size):
+            memories(plant, c, work.arguments, node, at, few)
+        for i in range(MEMORIES):
             if node > 0:
-                step.kept[node - 1, i] = step.now[i]
+                few[KEPT + node - 1, i] = few[NOW, i]
             else:
-                step.now[i] = 0.5 * (memory[i] + step.kept[0, i])
-    evaluate(c, plant.laws, plant.coefficients, plant.offsets, step.line, step.context,
-             step.now, step.new)
+                few[NOW, i] = 0.5 * (few[MEMORY, i] + few[KEPT, i])
+    evaluate(c, plant.laws, plant.coefficients, plant.offsets, work.arguments[row], few[CONTEXT],
+             few[remembered], work.efforts[NEW])
 
 
 @jit_part
-def bend(plant: Packed, c: int, h: float, step: Step) -> None:
+def bend(plant: Packed, c: int, h: float, work: Work) -> None:
     """Set the parabola through the efforts, and the slope and bend of the modes' forcing."""
-    for i in range(step.work.size):
-        step.q[0, i] = plant.bm[c, 0, i] * step.du[0] + plant.bm[c, 1, i] * step.du[1]
-        step.q[1, i] = 0.0
-    scale = 1.0 / h
-    for e in range(plant.counts[c, 2]):
-        linear = (4.0 * step.f[1, e] - 3.0 * step.f[0, e] - step.f[2, e]) * scale
-        square = 2.0 * (step.f[0, e] - 2.0 * step.f[1, e] + step.f[2, e]) * (scale * scale)
-        step.parabola[0, e], step.parabola[1, e] = linear, square
-        for i in range(step.work.size):
-            step.q[0, i] += plant.gm[c, e, i] * linear
-            step.q[1, i] += plant.gm[c, e, i] * square
+    modal, modes, efforts, few = plant.modal, work.modes, work.efforts, work.few
+    for i in range(modes.shape[1]):
+        modes[SLOPE, i] = (modal[c, INPUTS, i] * few[DU, 0]
+                           + modal[c, INPUTS + 1, i] * few[DU, 1])
+        modes[BEND, i] = 0.0
+    scale = 1.0 / h if h > 0.0 else 0.0
+    for e in range(plant.counts[c, EFFORTS]):
+        linear = (4.0 * efforts[F + 1, e] - 3.0 * efforts[F, e] - efforts[F + 2, e]) * scale
+        square = 2.0 * (efforts[F, e] - 2.0 * efforts[F + 1, e] + efforts[F + 2, e]) * (
+            scale * scale)
+        efforts[PARABOLA, e], efforts[PARABOLA + 1, e] = linear, square
+        for i in range(modes.shape[1]):
+            modes[SLOPE, i] += modal[c, GAINS + e, i] * linear
+            modes[BEND, i] += modal[c, GAINS + e, i] * square
 
 
 @jit_part
-def _passed(plant: Packed, c: int, step: Step) -> float:
+def _passed(plant: Packed, c: int, z: FloatArray) -> float:
     # Error where a step passes by the standstill, at which a ripple vanishes for a moment that
     # may lie between all places where it is asked.
     error = 0.0
-    for e in range(plant.counts[c, 2]):
+    for e in range(plant.counts[c, EFFORTS]):
         if plant.laws[c, e] == 5:
             o, width = plant.offsets[c, e], plant.coefficients[c, e, 3]
-            first, middle, end = step.z[0, o], step.z[1, o], step.z[2, o]
-            lower, upper = min(first, min(middle, end)), max(first, max(middle, end))
+            lower = min(z[0, o], min(z[1, o], z[2, o]))
+            upper = max(z[0, o], max(z[1, o], z[2, o]))
             if lower < AWAY * width and upper > -AWAY * width:
                 error = max(error, ((upper - lower) / width) ** 4)
     return error
@@ -224,7 +240,7 @@ def _passed(plant: Packed, c: int, step: Step) -> float:
 
 @jit_part
 def solve(plant: Packed, c: int, s: FloatArray, n: int, time: float, h: float, before: float,
-          step: Step, memory: FloatArray) -> float:
+          work: Work) -> float:
     """
     Find the efforts of a step.
 
@@ -237,54 +253,55 @@ def solve(plant: Packed, c: int, s: FloatArray, n: int, time: float, h: float, b
     time, h : float
         Start and length of the step [s].
     before : float
-        Length of the step before [s], whose parabola is ``step.former``; 0 after a jump.
-    step : Step
-    memory : numpy.ndarray
-        Memories at the start.
+        Length of the step before [s], whose parabola is FORMER; 0 after a jump.
+    work : Work
 
     Returns
     -------
     float
         Error in parts of what is allowed; negative where the iteration does not converge.
     """
-    half, quarter = 0.5 * h, 0.25 * h
-    n_real, n_pairs, efforts = plant.counts[c, 0], plant.counts[c, 1], plant.counts[c, 2]
-    phis(quarter, plant.rates, c, n_real, n_pairs, step.p)
-    doubled(quarter, plant.rates, c, n_real, n_pairs, step.p, 0)
-    doubled(half, plant.rates, c, n_real, n_pairs, step.p, 1)
+    n_real, n_pairs, count = plant.counts[c, REALS], plant.counts[c, PAIRS], plant.counts[
+        c, EFFORTS]
+    efforts = work.efforts
+    phis(0.25 * h, plant.modal, c, n_real, n_pairs, work.modes)
     for node in range(1, 3):
-        at = half if node == 1 else h
-        for e in range(efforts):
-            step.f[node, e], step.old[node, e] = step.f[0, e], 0.0
+        at = 0.5 * node * h
+        doubled(0.5 * at, plant.modal, c, n_real, n_pairs, work.modes, PHI + 4 * (node - 1))
+        for e in range(count):
+            efforts[F + node, e], efforts[OLD + node, e] = efforts[F, e], 0.0
             if before > 0.0:
                 # The parabola before, of which the start is the end, goes on.
-                square = step.former[1, e]
-                slope = step.former[0, e] + 2.0 * before * square
-                step.f[node, e] += at * (slope + at * square)
+                square = efforts[FORMER + 1, e]
+                slope = efforts[FORMER, e] + 2.0 * before * square
+                efforts[F + node, e] += at * (slope + at * square)
     error, converged = 0.0, False
     for iteration in range(ITERATIONS + 1):
         # In the end, once more: what the laws say at a quarter, where no parabola was asked.
         last, error = error, 0.0
-        bend(plant, c, h, step)
+        bend(plant, c, h, work)
         for k in range(1 if converged else 2):
             node = 0 if converged else k + 1
-            at = quarter if converged else (half if node == 1 else h)
-            _efforts_at(plant, c, s, n, time, at, node, step, memory)
-            for e in range(efforts):
-                told = step.f[node, e]
+            at = 0.25 * h if converged else 0.5 * node * h
+            efforts_at(plant, c, s, n, time, at, node, QUARTER if converged else node, work)
+            for e in range(count):
+                told = efforts[F + node, e]
                 if converged:
-                    told += quarter * (step.parabola[0, e] + quarter * step.parabola[1, e])
-                step.change[node, e] = step.new[e] - told
-            if converged:
-                return max(DEFECT * effect(plant, c, step, 0, 2, h), _passed(plant, c, step))
-            error = max(error, effect(plant, c, step, node, node, at))
+                    told += at * (efforts[PARABOLA, e] + at * efforts[PARABOLA + 1, e])
+                efforts[CHANGE + node, e] = efforts[NEW, e] - told
+            # What a change at a quarter does is done over the whole step.
+            error = max(error, effect(plant, c, work, CHANGE + node,
+                                      PHI + 4 * (2 if converged else node),
+                                      h if converged else at))
+        if converged:
+            return max(DEFECT * error, _passed(plant, c, work.arguments))
         for node in range(1, 3):
-            for e in range(efforts):
+            for e in range(count):
                 # Steffensen's step: dissipation may be far stiffer than the modes.
-                change, old = step.change[node, e], step.old[node, e]
+                change, old = efforts[CHANGE + node, e], efforts[OLD + node, e]
                 slope = change / old if old != 0.0 else 0.0
-                step.old[node, e] = change
-                step.f[node, e] += change / (1.0 - max(STEEPEST, min(FLATTEST, slope)))
+                efforts[OLD + node, e] = change
+                efforts[F + node, e] += change / (1.0 - max(STEEPEST, min(FLATTEST, slope)))
         converged = error < CONVERGED or error * error < 0.3 * CONVERGED * last
         if not converged and iteration == ITERATIONS - 1:
             return -1.0

@@ -15,64 +15,10 @@ Vectors hold the real modes first, then the real parts of the pairs, then their 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from lg_husky_sim.jit import jit_part
 from lg_husky_sim.signals import FloatArray
-import numpy as np
-from numpy.typing import NDArray
-
-
-class Packed(NamedTuple):
-    """
-    What the kernel needs of a plant; the first axis counts its sets of matrices.
-
-    Parameters
-    ----------
-    onset : numpy.ndarray, shape (2,)
-        Kind (0: first set always; 1: second set from time [s] on; 2: second set where x is at or
-        beyond a place [m]; 3: before it) and the value.
-    stages : numpy.ndarray, shape (n_sets, 8)
-        Latency [s], slew forward and yaw [m/s², rad/s²], limit forward and yaw [m/s, rad/s],
-        volts per speed and per yaw rate [V·s/m, V·s/rad], clamp [V] (0: none).
-    counts : numpy.ndarray, shape (n_sets, 7)
-        Real modes, pairs, efforts; whether efforts need the pose, a memory, the voltages, what
-        their arguments add up to.
-    rates : numpy.ndarray, shape (n_sets, n_modes)
-        Of the modes [1/s].
-    out_of, into : numpy.ndarray, shapes (n_sets, n, n_modes), (n_sets, n_modes, n)
-        States of modes, modes of states.
-    bm, gm : numpy.ndarray, shapes (n_sets, 2 or n_efforts, n_modes)
-        What voltages and efforts do to the modes.
-    hm, k : numpy.ndarray, shapes (n_sets, n_modes or 2, n_arguments)
-        Arguments of the efforts.
-    cy : numpy.ndarray, shape (n_sets, 11, n + 2 + n_efforts)
-        Outputs of the plant, then the derivatives of yaw rate and speed: of modes, voltages and
-        efforts.
-    ci : numpy.ndarray, shape (n_sets, 4, n)
-        Wheel rates, speed and yaw rate.
-    laws, coefficients, offsets : numpy.ndarray, shapes (n_sets, n_efforts[, laws.WIDTH])
-    first_step : numpy.ndarray, shape (n_sets, 1)
-        After a jump [s].
-    """
-
-    onset: FloatArray
-    stages: FloatArray
-    counts: NDArray[np.int64]
-    rates: FloatArray
-    out_of: FloatArray
-    into: FloatArray
-    bm: FloatArray
-    gm: FloatArray
-    hm: FloatArray
-    k: FloatArray
-    cy: FloatArray
-    ci: FloatArray
-    laws: FloatArray
-    coefficients: FloatArray
-    offsets: FloatArray
-    first_step: FloatArray
-
+from lg_husky_sim.simulation.arrays import BEND, INSIDE, PHI, RATE, RATES, SLOPE, XI
 
 #: Factors: divisions would cost most of a step.
 _T = tuple(1.0 / math.factorial(k) for k in range(18))
@@ -156,95 +102,91 @@ def pair_phis(re: float, im: float, e_re: float, e_im: float) -> tuple[
 
 
 @jit_part
-def phis(t: float, rates: FloatArray, c: int, n_real: int, n_pairs: int, p: FloatArray) -> None:
-    """Put phi_1 to phi_4 of rates times ``t`` [s] into the rows 0 to 3 of ``p[0]``."""
-    for i in range(p.shape[2]):
-        p[0, 0, i], p[0, 1, i], p[0, 2, i], p[0, 3, i] = real_phis(rates[c, i] * t)
+def phis(t: float, modal: FloatArray, c: int, n_real: int, n_pairs: int, modes: FloatArray
+         ) -> None:
+    """Put phi_1 to phi_4 of the rates times ``t`` [s] into the rows from PHI on."""
+    for i in range(modes.shape[1]):
+        (modes[PHI, i], modes[PHI + 1, i], modes[PHI + 2, i], modes[PHI + 3, i]) = real_phis(
+            modal[c, RATES, i] * t)
     for k in range(n_real, n_real + n_pairs):
         m = k + n_pairs
-        re, im = rates[c, k] * t, rates[c, m] * t
+        re, im = modal[c, RATES, k] * t, modal[c, RATES, m] * t
         size = math.exp(re)
-        (p[0, 0, k], p[0, 0, m], p[0, 1, k], p[0, 1, m], p[0, 2, k], p[0, 2, m], p[0, 3, k],
-         p[0, 3, m]) = pair_phis(re, im, size * math.cos(im) - 1.0, size * math.sin(im))
+        (modes[PHI, k], modes[PHI, m], modes[PHI + 1, k], modes[PHI + 1, m], modes[PHI + 2, k],
+         modes[PHI + 2, m], modes[PHI + 3, k], modes[PHI + 3, m]) = pair_phis(
+            re, im, size * math.cos(im) - 1.0, size * math.sin(im))
 
 
 @jit_part
-def doubled(t: float, rates: FloatArray, c: int, n_real: int, n_pairs: int, p: FloatArray,
-            k0: int) -> None:
+def doubled(t: float, modal: FloatArray, c: int, n_real: int, n_pairs: int, modes: FloatArray,
+            p: int) -> None:
     """
-    Put phi_k of rates times 2 ``t`` into ``p[k0 + 1]``, from those at ``t`` [s] in ``p[k0]``.
+    Put phi_k of the rates times 2 ``t`` into the rows from p + 4 on, of those at ``t`` from p on.
 
     2^k phi_k(2z) = exp(z) phi_k(z) + sum of phi_j(z)/(k - j)! for j = 1 to k.
     """
-    for i in range(p.shape[2]):
-        f1, f2, f3, f4 = p[k0, 0, i], p[k0, 1, i], p[k0, 2, i], p[k0, 3, i]
-        e = 1.0 + rates[c, i] * t * f1
-        p[k0 + 1, 0, i] = 0.5 * (e * f1 + f1)
-        p[k0 + 1, 1, i] = 0.25 * (e * f2 + f1 + f2)
-        p[k0 + 1, 2, i] = 0.125 * (e * f3 + 0.5 * f1 + f2 + f3)
-        p[k0 + 1, 3, i] = 0.0625 * (e * f4 + T3 * f1 + 0.5 * f2 + f3 + f4)
+    d = p + 4
+    for i in range(modes.shape[1]):
+        f1, f2, f3, f4 = modes[p, i], modes[p + 1, i], modes[p + 2, i], modes[p + 3, i]
+        e = 1.0 + modal[c, RATES, i] * t * f1
+        modes[d, i] = 0.5 * (e * f1 + f1)
+        modes[d + 1, i] = 0.25 * (e * f2 + f1 + f2)
+        modes[d + 2, i] = 0.125 * (e * f3 + 0.5 * f1 + f2 + f3)
+        modes[d + 3, i] = 0.0625 * (e * f4 + T3 * f1 + 0.5 * f2 + f3 + f4)
     for k in range(n_real, n_real + n_pairs):
         m = k + n_pairs
-        re, im = rates[c, k] * t, rates[c, m] * t
-        a = 1.0 + re * p[k0, 0, k] - im * p[k0, 0, m]
-        b = re * p[k0, 0, m] + im * p[k0, 0, k]
+        re, im = modal[c, RATES, k] * t, modal[c, RATES, m] * t
+        a = 1.0 + re * modes[p, k] - im * modes[p, m]
+        b = re * modes[p, m] + im * modes[p, k]
         for i in range(4):
-            f, g = p[k0, i, k], p[k0, i, m]
-            p[k0 + 1, i, k], p[k0 + 1, i, m] = a * f - b * g, a * g + b * f
-        for i in (k, m):
-            f1, f2, f3, f4 = p[k0, 0, i], p[k0, 1, i], p[k0, 2, i], p[k0, 3, i]
-            p[k0 + 1, 0, i] = 0.5 * (p[k0 + 1, 0, i] + f1)
-            p[k0 + 1, 1, i] = 0.25 * (p[k0 + 1, 1, i] + f1 + f2)
-            p[k0 + 1, 2, i] = 0.125 * (p[k0 + 1, 2, i] + 0.5 * f1 + f2 + f3)
-            p[k0 + 1, 3, i] = 0.0625 * (p[k0 + 1, 3, i] + T3 * f1 + 0.5 * f2 + f3 + f4)
+            f, g = modes[p + i, k], modes[p + i, m]
+            modes[d + i, k], modes[d + i, m] = a * f - b * g, a * g + b * f
+        for i in range(k, m + 1, n_pairs):
+            f1, f2, f3, f4 = modes[p, i], modes[p + 1, i], modes[p + 2, i], modes[p + 3, i]
+            modes[d, i] = 0.5 * (modes[d, i] + f1)
+            modes[d + 1, i] = 0.25 * (modes[d + 1, i] + f1 + f2)
+            modes[d + 2, i] = 0.125 * (modes[d + 2, i] + 0.5 * f1 + f2 + f3)
+            modes[d + 3, i] = 0.0625 * (modes[d + 3, i] + T3 * f1 + 0.5 * f2 + f3 + f4)
 
 
 @jit_part
-def advance(t: float, first: int, xi: FloatArray, r: FloatArray, q: FloatArray, p: FloatArray,
-            node: int, n_real: int, n_pairs: int, out: FloatArray) -> None:
+def advance(t: float, first: int, modes: FloatArray, p: int, n_real: int, n_pairs: int) -> None:
     """
-    Put the modes (``first`` = 0) or their integrals (1) at ``t`` [s] into ``out``.
+    Put the modes (``first`` = 0) or their integrals (1) at ``t`` [s] into the row INSIDE.
 
-    ``q`` holds q_1 and q_2 in its rows, ``p[node]`` the phis.
+    Their phis are in the rows from ``p`` on.
     """
     begin = 1.0 if first == 0 else t
     scale = t if first == 0 else t * t
     scale1 = scale * t
     scale2 = 2.0 * scale1 * t
-    for i in range(out.size):
-        out[i] = begin * xi[i] + scale * (p[node, first, i] * r[i]) + (
-            scale1 * (p[node, first + 1, i] * q[0, i])
-            + scale2 * (p[node, first + 2, i] * q[1, i]))
+    p += first
+    for i in range(modes.shape[1]):
+        modes[INSIDE, i] = begin * modes[XI, i] + scale * (modes[p, i] * modes[RATE, i]) + (
+            scale1 * (modes[p + 1, i] * modes[SLOPE, i])
+            + scale2 * (modes[p + 2, i] * modes[BEND, i]))
     for k in range(n_real, n_real + n_pairs):
         m = k + n_pairs
-        real = scale * (p[node, first, k] * r[k] - p[node, first, m] * r[m])
-        imag = scale * (p[node, first, k] * r[m] + p[node, first, m] * r[k])
+        real = scale * (modes[p, k] * modes[RATE, k] - modes[p, m] * modes[RATE, m])
+        imag = scale * (modes[p, k] * modes[RATE, m] + modes[p, m] * modes[RATE, k])
         for d in range(2):
             factor = scale1 if d == 0 else scale2
-            f, g = p[node, first + 1 + d, k], p[node, first + 1 + d, m]
-            real += factor * (f * q[d, k] - g * q[d, m])
-            imag += factor * (f * q[d, m] + g * q[d, k])
-        out[k] = begin * xi[k] + real
-        out[m] = begin * xi[m] + imag
+            f, g = modes[p + 1 + d, k], modes[p + 1 + d, m]
+            real += factor * (f * modes[SLOPE + d, k] - g * modes[SLOPE + d, m])
+            imag += factor * (f * modes[SLOPE + d, m] + g * modes[SLOPE + d, k])
+        modes[INSIDE, k] = begin * modes[XI, k] + real
+        modes[INSIDE, m] = begin * modes[XI, m] + imag
 
 
 @jit_part
-def rate_of(c: int, rates: FloatArray, n_real: int, n_pairs: int, xi: FloatArray,
-            q: FloatArray, out: FloatArray) -> None:
-    """Put lambda xi + q into ``out``."""
-    for i in range(out.size):
-        out[i] = rates[c, i] * xi[i] + q[i]
+def rate_of(c: int, modal: FloatArray, n_real: int, n_pairs: int, modes: FloatArray, force: int
+            ) -> None:
+    """Put lambda xi + q into the row RATE; the row ``force`` has q."""
+    for i in range(modes.shape[1]):
+        modes[RATE, i] = modal[c, RATES, i] * modes[XI, i] + modes[force, i]
     for k in range(n_real, n_real + n_pairs):
         m = k + n_pairs
-        out[k] = rates[c, k] * xi[k] - rates[c, m] * xi[m] + q[k]
-        out[m] = rates[c, k] * xi[m] + rates[c, m] * xi[k] + q[m]
-
-
-@jit_part
-def add_product(matrices: FloatArray, c: int, vector: FloatArray, count: int,
-                out: FloatArray) -> None:
-    """Add matrix times vector to ``out``; row j of the stored matrix is its column j."""
-    for j in range(count):
-        value = vector[j]
-        for i in range(out.size):
-            out[i] += matrices[c, j, i] * value
+        modes[RATE, k] = (modal[c, RATES, k] * modes[XI, k]
+                          - modal[c, RATES, m] * modes[XI, m] + modes[force, k])
+        modes[RATE, m] = (modal[c, RATES, k] * modes[XI, m]
+                          + modal[c, RATES, m] * modes[XI, k] + modes[force, m])

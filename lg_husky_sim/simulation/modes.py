@@ -12,8 +12,17 @@ from lg_husky_sim.husky.effects import OnsetKind
 from lg_husky_sim.husky.laws import CONTEXTUAL, Law, REMEMBERING, WIDTH
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet
 from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.simulation.arrays import (
+    BEFORE_PLACE,
+    BEYOND_PLACE,
+    FROM_TIME,
+    GAINS,
+    MOTION,
+    Packed,
+    ROWS,
+    STAGES,
+)
 from lg_husky_sim.simulation.merging import merged
-from lg_husky_sim.simulation.modal_kernel import Packed
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,11 +32,9 @@ WORST_CONDITION = 1e7
 PERTURBATION = 1e-10
 #: Entries of a matrix that are rounding, relative to the largest.
 NOTHING = 1e-15
-#: Rows of the outputs in the kernel: those of the plant, the yaw acceleration [rad/s²] and the
-#: derivative of the forward speed [m/s²], which is no specific force on a slope.
-ROWS = 11
 _LANES = 4
-_ONSETS = {OnsetKind.TIME: 1.0, OnsetKind.PLACE_ABOVE: 2.0, OnsetKind.PLACE_BELOW: 3.0}
+_ONSETS = {OnsetKind.TIME: FROM_TIME, OnsetKind.PLACE_ABOVE: BEYOND_PLACE,
+           OnsetKind.PLACE_BELOW: BEFORE_PLACE}
 _Numbers = TypeVar('_Numbers', NDArray[np.float64], NDArray[np.int64])
 
 
@@ -184,33 +191,35 @@ def packed(plant: Plant) -> Packed:
     size = -(-max(mode.rates.size for mode in modes) // _LANES) * _LANES
     efforts = max(one.laws.size for one in sets)
     arguments = max(one.h.shape[0] for one in sets)
-    stacks: list[list[NDArray[np.generic]]] = [[] for _ in range(15)]
+    onset = [0.0, 0.0]
+    if plant.onset is not None and len(sets) > 1:
+        onset = [_ONSETS[plant.onset.kind], plant.onset.value]
+    stacks: list[list[NDArray[np.generic]]] = [[] for _ in Packed._fields]
     for one, mode in zip(sets, modes, strict=True):
-        rows, rows_u, rows_f = _rows(one)
         laws = set(one.laws.tolist())
         needs = (not laws.isdisjoint(CONTEXTUAL), not laws.isdisjoint(REMEMBERING),
                  bool(one.k.any()), Law.STICTION in laws)
+        stages = np.array([*_stage(one.command), _first_step(mode), *onset])
+        assert stages.size == STAGES
         counts = np.array([mode.n_real, mode.n_pairs, one.laws.size, *needs], dtype=np.int64)
-        pieces: list[NDArray[np.generic]] = [
-            np.array(_stage(one.command)), counts, _padded(mode.rates, (size,)),
-            _padded(mode.out_of, (n, size)), _padded(mode.into, (size, n)),
-            _padded((mode.into @ one.b).T, (2, size)),
-            _padded((mode.into @ one.g).T, (efforts, size)),
-            _padded((one.h @ mode.out_of).T, (size, arguments)),
-            _padded(one.k.T, (2, arguments)),
-            np.hstack([(mode.out_of.T @ rows).T, rows_u.T,
-                       _padded(rows_f.T, (ROWS, efforts))]),
-            np.ascontiguousarray((mode.out_of.T @ rows[:, :4]).T),
+        motion = _padded((mode.out_of.T @ one.rows[:4].T).T, (GAINS - MOTION, size))
+        modal = np.vstack([
+            _padded(mode.rates[None], (1, size)), _padded((mode.into @ one.b).T, (2, size)),
+            motion, _padded((mode.into @ one.g).T, (efforts, size))])
+        bases = np.stack([_padded(mode.out_of, (n, size)), _padded(mode.into.T, (n, size))])
+        readings = np.vstack([_padded((one.h @ mode.out_of).T, (size, arguments)),
+                              _padded(one.k.T, (2, arguments))])
+        rows, rows_u, rows_f = _rows(one)
+        outputs = np.hstack([(mode.out_of.T @ rows).T, rows_u.T,
+                             _padded(rows_f.T, (ROWS, efforts))])
+        pieces: Packed = Packed(
+            stages, counts, modal, bases, readings, outputs,
             # What pads a set reads no argument: there may be none in the whole plant.
             _padded(one.laws, (efforts,), int(Law.HEADING)),
-            _padded(one.coefficients, (efforts, WIDTH)), _padded(one.offsets, (efforts,)),
-            np.array([_first_step(mode)])]
+            _padded(one.coefficients, (efforts, WIDTH)), _padded(one.offsets, (efforts,)))
         for stack, piece in zip(stacks, pieces, strict=True):
             stack.append(piece)
-    onset = np.zeros(2)
-    if plant.onset is not None and len(sets) > 1:
-        onset[:] = _ONSETS[plant.onset.kind], plant.onset.value
-    return Packed(onset, *(_stacked(stack) for stack in stacks))
+    return Packed(*(_stacked(stack) for stack in stacks))
 
 
 def _stacked(arrays: list[NDArray[np.generic]]) -> NDArray[Any]:

@@ -10,10 +10,10 @@ import math
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
-from lg_husky_sim.simulation.event_kernel import COLUMNS
+from lg_husky_sim.simulation.arrays import workspace
+from lg_husky_sim.simulation.event_kernel import COLUMNS, follow
 from lg_husky_sim.simulation.events import Events, Propagator
 from lg_husky_sim.simulation.initial_state import InitialStates
-from lg_husky_sim.simulation.marching import march
 import numpy as np
 
 
@@ -197,16 +197,20 @@ class Simulator:
         numpy.ndarray, shape (n_steps, 15)
             The kernel's columns after each step.
         """
-        flat, count = np.array(state.flat), len(state.waiting)
-        out = np.empty((commands.shape[0], len(COLUMNS)))
-        ages = np.zeros(count + len(out))
-        values = np.zeros((ages.size, 2))
-        ages[:count], values[:count] = state.waiting[:, 0], state.waiting[:, 1:]
-        first, last = march(flat, ages, values, count,
-                            np.ascontiguousarray(commands, dtype=np.float64), out, self.period,
-                            self._latency, self.fine_pose, self.propagator.packed)
-        row = out[-1] if len(out) else state.row
-        waiting = np.column_stack([ages[first:last], values[first:last]])
+        flat, steps = np.array(state.flat), len(commands)
+        out = np.empty((steps, len(COLUMNS)))
+        # One after the other, as steps by themselves would add them.
+        clock = np.full(1 + steps, self.period)
+        clock[0] = flat[state.n + 6]
+        clock = np.add.accumulate(clock)
+        stamps = np.concatenate([clock[0] + state.waiting[:, 0], clock[:-1]])
+        values = np.concatenate([state.waiting[:, 1:], commands])
+        follow(flat, stamps, values, clock[1:], np.arange(steps), out, clock[1:], self.fine_pose,
+               self.propagator.packed, workspace(self.propagator.packed))
+        ages = stamps - clock[-1]
+        held = ages + self._latency >= -self.period
+        row = out[-1] if steps else state.row
+        waiting = np.column_stack([ages, values])[held]
         return _state(flat, np.array(row), state.states, waiting), out
 
     def adopt(self, state: SimulatorState) -> SimulatorState:

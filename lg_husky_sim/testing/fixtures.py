@@ -32,7 +32,7 @@ def live_husky() -> Iterator[Callable[..., Any]]:
     the test.
     """
     from lg_husky_sim.testing.live import LiveHusky, probed_domain
-    # Here and once, before anybody waits: the first start of a node compiles for a minute or so.
+    # Here and once, before anybody waits: the kernel is compiled by it where that is new.
     LockStepHusky().step()
     made: list[LiveHusky] = []
     with probed_domain() as probe:

@@ -47,8 +47,8 @@ class Reference:
             memory = np.concatenate([s[n + 6:n + 8], np.zeros(MEMORY - 2)])
             context = np.zeros(CONTEXT)
             context[:6] = time, s[n + 3], s[n + 4], s[n + 5], s[n], s[n + 1]
-            evaluate(0, one.laws[None], one.coefficients[None],  # type: ignore[arg-type]
-                     one.offsets[None], z, context, memory, f)  # type: ignore[arg-type]
+            evaluate(0, one.laws[None], one.coefficients[None],
+                     one.offsets[None], z, context, memory, f)
         return f, z
 
     def _voltages(self, one: PlantSet, shaped: FloatArray) -> FloatArray:

@@ -41,7 +41,7 @@ def test_least_squares_finds_the_truth(fit: FitResult, truth: Truth) -> None:
 
 def test_intervals_hold_the_truth_as_often_as_they_say(husky: ModelFile, make_drive: Drive,
                                                        truth: Truth) -> None:
-    # Counted over 200 recordings by benchmarks/coverage.py; here over ten.
+    # Counted over 200 recordings by benchmarks/interval_coverage.py; here over ten.
     fits = [estimate(husky, [make_drive(seed=seed)], starts=1) for seed in range(20, 30)]
     inside = [one.low < truth[one.name] < one.high for fit in fits for one in fit.estimates]
     assert len(inside) == 30

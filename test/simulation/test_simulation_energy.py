@@ -91,8 +91,8 @@ def test_power_into_the_stores_is_never_positive(effects: tuple[Effect, ...]) ->
         for x in random_states(weights, 40, seed):
             f = np.zeros(one.laws.size)
             if f.size:
-                evaluate(0, one.laws[None], one.coefficients[None],  # type: ignore[arg-type]
-                         one.offsets[None], one.h @ x, np.zeros(CONTEXT),  # type: ignore[arg-type]
+                evaluate(0, one.laws[None], one.coefficients[None],
+                         one.offsets[None], one.h @ x, np.zeros(CONTEXT),
                          np.full(MEMORY, 5.0), f)
             flow = 2.0 * weights * x * (one.a @ x + one.g @ f)
             assert flow.sum() <= 1e-11 * np.abs(flow).sum()
@@ -131,8 +131,8 @@ def test_the_check_can_fail() -> None:
     weights = np.array([0.08, 0.08, 48.39, 3.0556, 0.22e-3, 0.22e-3]) / 2.0
     x = np.array([0.0, 0.0, 2.0, 1.0, 0.0, 0.0])
     f = np.zeros(1)
-    evaluate(0, one.laws[None], one.coefficients[None],  # type: ignore[arg-type]
-             one.offsets[None], one.h @ x, np.zeros(CONTEXT),  # type: ignore[arg-type]
+    evaluate(0, one.laws[None], one.coefficients[None],
+             one.offsets[None], one.h @ x, np.zeros(CONTEXT),
              np.zeros(MEMORY), f)
     assert f[0] == pytest.approx(80.0)
     turning = one.a[3, 3] + one.g[3, 0] * f[0]

@@ -45,8 +45,8 @@ class Equations:
             memory = np.zeros(MEMORY)
             memory[:2] = s[n + 6:]
             context = np.array([time, s[n + 3], s[n + 4], s[n + 5], s[n], s[n + 1]])
-            evaluate(0, one.laws[None], one.coefficients[None],  # type: ignore[arg-type]
-                     one.offsets[None], z, context, memory, f)  # type: ignore[arg-type]
+            evaluate(0, one.laws[None], one.coefficients[None],
+                     one.offsets[None], z, context, memory, f)
         return f, z
 
     def outputs(self, time: float, s: FloatArray, u: FloatArray) -> FloatArray:

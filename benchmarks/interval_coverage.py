@@ -3,9 +3,9 @@
 """
 How often the 95 % intervals of `identify` contain the truth, over synthetic recordings.
 
-Run ``python benchmarks/coverage.py --count 200``. Every recording is the paper's circle driven by
-a robot of random dampings and command gain, once with white sensor noise and once with noise that
-is correlated over half a second on top of it.
+Run ``python benchmarks/interval_coverage.py --count 200``. Every recording is the paper's circle,
+driven by a robot of random dampings and command gain, once with white sensor noise and once with
+noise that is correlated over half a second on top of it.
 """
 
 from __future__ import annotations
