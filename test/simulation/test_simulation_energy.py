@@ -12,6 +12,7 @@ from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation import Simulator
+from lg_husky_sim.simulation.effort_kernel import SPEED_ERROR
 import numpy as np
 import pytest
 
@@ -117,7 +118,9 @@ def test_steps_never_gain_energy(effects: tuple[Effect, ...]) -> None:
             after, _ = simulator.run(simulator_state, np.zeros((1, 2)))
             flat = np.array(after.flat)
             energies.append(float(weights @ flat[:state.n] ** 2))
-        assert np.all(np.diff(energies) <= 1e-12 * energies[0]), energies
+        # At rest dry friction holds the speeds no better than to the error of a step.
+        resting = float(np.sum(weights)) * SPEED_ERROR ** 2
+        assert np.all(np.diff(energies) <= 1e-12 * energies[0] + resting), energies
         assert energies[-1] < 0.9 * energies[0]
 
 

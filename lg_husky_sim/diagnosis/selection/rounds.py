@@ -194,12 +194,11 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         base = min((evidence.fit(with_jitter(p, evidence), base.slopes) for p in points),
                    key=lambda f: f.cost)
         seen = _looks(evidence, base, pool, [t.hypothesis.effect for t in tried])
-        chosen = list(seen[:few])
-        known = {one.hypothesis.label for one in chosen}
-        chosen += [Look(t.hypothesis, numbers_of(t), math.inf) for t in tried[:3]
-                   if t.hypothesis.label not in known]
+        known = {t.hypothesis.label for t in tried[:3]}
+        chosen = [one for one in seen[:few] if one.hypothesis.label not in known]
+        chosen += [Look(t.hypothesis, numbers_of(t), math.inf) for t in tried[:3]]
         guide = replace(base.point, places=best.fit.point.places[:base.point.places.size])
-        tried = fitted(evidence, base, chosen, [base.point, guide], tried[:3])
+        tried = fitted(evidence, base, chosen, [base.point, guide], seen)
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     tried.sort(key=lambda t: (is_negligible(t), -t.score))
@@ -257,7 +256,7 @@ def numbers_of(tried: Tried) -> Numbers:
 
 
 def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequence[Point],
-           earlier: Sequence[Tried] = (), *, whole: bool = True) -> list[Tried]:
+           further: Sequence[Look] = (), *, whole: bool = True) -> list[Tried]:
     """
     Fit hypotheses from where looks and points say, order by score.
 
@@ -270,7 +269,7 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     looks : sequence of Look
     points : sequence of Point
         Of the base, from where a fit may begin.
-    earlier : sequence of Tried
+    further : sequence of Look
         Whose numbers are beginnings, too.
     whole : bool
         Whether to finish the fits of the best ones.
@@ -285,8 +284,9 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     for one in looks:
         if one.gain < least:
             continue
-        numbers = [one.numbers, *(numbers_of(t) for t in earlier
-                                  if t.hypothesis.label == one.hypothesis.label)]
+        numbers = [one.numbers, *(other.numbers for other in further
+                                  if other.hypothesis.label == one.hypothesis.label
+                                  and other is not one)]
         result = attempt(evidence, base, one.hypothesis, list(itertools.product(points, numbers)),
                          whole=False)
         if result is not None:

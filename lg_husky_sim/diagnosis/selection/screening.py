@@ -210,6 +210,8 @@ def _weaker(hypothesis: Hypothesis, rungs: Sequence[_Rung]) -> list[Numbers] | N
     if len(rungs) < 2 or all(in_proportion(hypothesis, rungs[0].group)):
         return None
     first, second = rungs[0], rungs[1]
+    if not np.all(np.isfinite(first.normal)):
+        return None
     wanted = np.linalg.lstsq(first.normal, first.slope, rcond=1e-9)[0]
     if (0.5 * float(wanted @ first.slope) < setting('least_look')
             or np.min(wanted) >= setting('least_factor')):
