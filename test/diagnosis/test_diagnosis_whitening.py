@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis.evidence.deviation import slow_model
 from lg_husky_sim.diagnosis.evidence.drives import Channel, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Point
 from lg_husky_sim.diagnosis.evidence.noise import (
@@ -19,7 +20,9 @@ from lg_husky_sim.diagnosis.evidence.noise import (
 )
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.evidence.whitener import MODEL
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import FloatArray
@@ -123,3 +126,16 @@ def test_whitening_is_linear_and_does_not_look_ahead(setup: tuple[Evidence, Poin
     cut = np.array(a)
     cut[whitener.frame.order[1000:]] = 0.0
     np.testing.assert_array_equal(whitener.apply(cut)[:1000], whitener.apply(a)[:1000])
+
+
+def test_a_decay_faster_than_a_step_of_the_filter_is_slowed_and_no_gain_with_it() -> None:
+    model = load_model()
+    usual, stiff = (slow_model(
+        compile_model(model.structure).at(model.parameters.replacing({'yaw_inertia': inertia})),
+        model.parameters['mass'], inertia, model.parameters['wheel_inertia'])
+        for inertia in (model.parameters['yaw_inertia'], 0.01))
+    rate, by_moment, by_voltage = (MODEL.index(name) for name in (
+        'turn_by_turn', 'turn_by_moment', 'turn_by_voltage_right'))
+    assert abs(usual[rate]) < abs(stiff[rate]) <= 0.5 / setting('longest_step') + 1e-9
+    for gain in (by_moment, by_voltage):
+        np.testing.assert_allclose(stiff[gain] / stiff[rate], usual[gain] / usual[rate], rtol=1e-6)
