@@ -50,7 +50,10 @@ class Kernel:
     def __call__(self, *arguments: Any) -> Any:
         """Call the machine code, or plain Python while :meth:`soon` waits for it."""
         if self._postponed:
-            self._seen = self._seen or arguments
+            if not self._seen:
+                import numba
+                # Now: an array may be read-only later, which is another type.
+                self._seen = tuple(map(numba.typeof, arguments))
             return self.plain(*arguments)
         machine = self._machine or self._made()
         return machine(*arguments)
@@ -76,11 +79,10 @@ class Kernel:
         self._postponed, done = True, threading.Event()
 
         def load() -> None:
-            import numba
             try:
                 elsewhere()
                 if self._seen:
-                    self._made().compile(tuple(map(numba.typeof, self._seen)))
+                    self._made().compile(self._seen)
             finally:
                 self._postponed, self._seen = False, ()
                 done.set()

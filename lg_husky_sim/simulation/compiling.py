@@ -64,7 +64,9 @@ def _compile_elsewhere() -> None:
 
 
 def _end_with_parent() -> None:
-    sys.stdin.buffer.read()
+    # By its number: a stream's lock would be held when the interpreter ends.
+    while os.read(0, 1):
+        pass
     os._exit(1)
 
 

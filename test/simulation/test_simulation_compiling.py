@@ -8,7 +8,9 @@ import threading
 import time
 
 from lg_husky_sim.jit import compiled, jit, jit_part, Kernel
+from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation import compiling
+import numpy as np
 import pytest
 
 pytestmark = pytest.mark.skipif(not compiled(), reason='numba is not used here')
@@ -62,6 +64,25 @@ def test_what_could_not_be_compiled_elsewhere_is_compiled_here() -> None:
     assert done.wait(60.0)
     kernel.plain = never
     assert kernel(0.7, 3) == expected
+
+
+@jit
+def _filled(values: FloatArray) -> float:
+    values[0] = 2.0
+    return float(values[0])
+
+
+def test_arrays_that_become_read_only_after_their_call_are_no_other_type() -> None:
+    assert isinstance(_filled, Kernel)
+    kernel, gate, values = Kernel(_filled.plain), threading.Event(), np.zeros(3)
+    done = kernel.soon(gate.wait)
+    assert kernel(values) == 2.0
+    values.setflags(write=False)
+    gate.set()
+    assert done.wait(60.0)
+    kernel.plain = never
+    assert len(kernel._made().signatures) == 1
+    assert kernel(np.zeros(3)) == 2.0
 
 
 @pytest.mark.parametrize(('longest', 'waits'), [(10.0, False), (0.0, True)])
