@@ -22,6 +22,7 @@ EXTRA_OF = {
     'plotly': 'report',
     'pybullet': 'bullet',
     'rosbags': 'bags',
+    'threadpoolctl': 'fast',
 }
 """Importable module to the extra of setup.py that brings it."""
 

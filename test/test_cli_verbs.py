@@ -60,7 +60,8 @@ def test_the_catalogue_is_listed_without_making_a_mistake() -> None:
     said = run('effects').output
     assert all(name in said for name in catalogue())
     one = json.loads(run('effects', 'coulomb_drivetrain', '--json').output)
-    assert {row['parameter'] for row in one} == {'dry_torque', 'dry_speed'}
+    assert {row['parameter'] for row in one} == {'dry_torque', 'dry_speed', 'breakaway_share',
+                                                 'breakaway_speed'}
 
 
 def test_manoeuvres_and_parameters_are_listed(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ class Equations:
         if f.size:
             memory = np.zeros(MEMORY)
             memory[:2] = s[n + 6:]
-            context = np.array([time, s[n + 3], s[n + 4], s[n + 5], s[n], s[n + 1]])
+            context = np.array([time, s[n + 3], s[n + 4], s[n + 5], s[n], s[n + 1], 0.0])
             evaluate(0, one.laws[None], one.coefficients[None],
                      one.offsets[None], z, context, memory, f)
         return f, z
