@@ -230,7 +230,7 @@ def page_of(sections: Mapping[str, tuple[Json, Sequence[Json]]], sources: Sequen
     if 'report' not in sections:
         parts += ['No set is reported at this state of the diagnosis: what follows was seen',
                   'while it was tuned. A report is made by', '',
-                  '    lg_husky prove --report --cases 600 --seed 90000 --world mix '
+                  '    lg_husky prove --report --cases 600 --seed 91000 --world mix '
                   '--out report --page docs/proof.md', '']
     for name, title in TITLES.items():
         if name in sections:
