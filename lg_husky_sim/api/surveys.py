@@ -13,7 +13,9 @@ from lg_husky_sim import recording as rec
 from lg_husky_sim.api.recordings import PathLike, rate, Recording
 from lg_husky_sim.api.robots import as_husky, Husky
 from lg_husky_sim.api.tables import page_part, Table
-from lg_husky_sim.comparison.slopes import body_rates
+from lg_husky_sim.diagnosis.sensors.faults import faults
+from lg_husky_sim.diagnosis.sensors.relations import Number, Relation, relations
+from lg_husky_sim.diagnosis.sensors.robot import differences
 from lg_husky_sim.errors import FitError, ParameterError, RecordingError
 from lg_husky_sim.identification.confidence import confidence, undetermined
 from lg_husky_sim.identification.multistart import refine
@@ -21,7 +23,7 @@ from lg_husky_sim.identification.problem import observations
 from lg_husky_sim.identification.unknowns import free_names, unknowns_of
 from lg_husky_sim.recording.recording import CONTINUOUS
 from lg_husky_sim.resources import config_path
-from lg_husky_sim.signals import FloatArray, TimeSeries
+from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.yaml_files import read_yaml
 import numpy as np
 
@@ -59,6 +61,8 @@ class Survey:
         Which parameters the drive leaves open, alone or together.
     notes : tuple of str
         Repairs of the clock, and what was left out.
+    sensors : Table
+        What each stream says of the others, without a model of the robot.
     unused : tuple of str
         Topics that serve no role.
     """
@@ -74,6 +78,7 @@ class Survey:
     missing: tuple[str, ...] = ()
     undetermined: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    sensors: Table = field(default=Table('', (), ()))
     unused: tuple[str, ...] = field(default=(), repr=False)
 
     @property
@@ -91,8 +96,8 @@ class Survey:
 
     def tables(self) -> tuple[Table, ...]:
         """Return the tables that have rows."""
-        return tuple(table for table in (self.streams, self.segments, self.excitation,
-                                         self.parameters) if table.rows)
+        return tuple(table for table in (self.streams, self.segments, self.sensors,
+                                         self.excitation, self.parameters) if table.rows)
 
     def points(self) -> dict[str, tuple[str, ...]]:
         """Return the lists by their headings."""
@@ -105,6 +110,7 @@ class Survey:
         return {'schema': SCHEMA, 'name': self.name, 'path': self.path,
                 'duration_s': self.duration, 'enough_for_diagnose': self.enough,
                 'streams': self.streams.data(), 'segments': self.segments.data(),
+                'sensors': self.sensors.data(),
                 'excitation': self.excitation.data(), 'parameters': self.parameters.data(),
                 'warnings': list(self.warnings), 'missing': list(self.missing),
                 'undetermined': list(self.undetermined), 'notes': list(self.notes),
@@ -133,14 +139,16 @@ def survey(recording: Recording, model: Husky | PathLike | None = None) -> Surve
     parts = rec.segments(recording)
     moving, excitation = _excitation(recording)
     parameters, left_open, problem = _parameters(parts, husky)
-    warnings = (*_robot_warnings(recording, husky), *problem)
+    related = relations(parts)
+    warnings = (*_robot_warnings(recording, husky, related), *problem)
     used = set(recording.topics.values())
     return Survey(
         recording.name, recording.path, recording.duration, _streams(recording),
         _segments(parts), excitation, parameters, warnings,
         _missing(recording, parts, moving, excitation), left_open, recording.notes,
-        tuple(f'{topic} ({kind})' for topic, kind in sorted(recording.present.items())
-              if topic not in used))
+        sensors=_related(related), unused=tuple(
+            f'{topic} ({kind})' for topic, kind in sorted(recording.present.items())
+            if topic not in used))
 
 
 def _streams(recording: Recording) -> Table:
@@ -217,44 +225,25 @@ def hardly_driven(excitation: Table) -> tuple[str, ...]:
                  if isinstance(share, float) and share < limits()['least_share'])
 
 
-def _rolling(recording: Recording) -> tuple[FloatArray, FloatArray] | None:
-    """Return the mean wheel rate [rad/s] and the speed of the pose [m/s] where wheels turn."""
-    if not {'wheels', 'pose'} <= set(recording.streams):
-        return None
-    found: list[tuple[FloatArray, FloatArray]] = []
-    for part in rec.segments(recording):
-        if 'pose' not in part.streams or 'wheels' not in part.streams:
-            continue
-        speed = body_rates(part.streams['pose'])
-        if speed is None or not len(speed):
-            continue
-        wheels = part.streams['wheels']
-        mean = np.interp(speed.times, wheels.times, wheels.values.mean(axis=1))
-        turning = np.abs(mean) > limits()['least_wheel_rate']
-        found.append((mean[turning], speed.column('forward')[turning]))
-    if not found:
-        return None
-    mean, forward = (np.concatenate(columns) for columns in zip(*found, strict=True))
-    good = np.isfinite(mean) & np.isfinite(forward)
-    return (mean[good], forward[good]) if good.sum() > 20 else None
+def _related(related: Sequence[Relation]) -> Table:
+    """Return what each stream says of the others, without a model of the robot."""
+    return Table('Sensors against each other (factor: reference over source)', (
+        'quantity', 'source', 'reference', 'factor', 'source is late by [s]', 'explained'), tuple(
+        (one.quantity, one.source, one.reference, _number(one.factor, 4), _number(one.late, 2),
+         f'{100.0 * max(one.explained, 0.0):.0f} %') for one in related))
 
 
-def _robot_warnings(recording: Recording, husky: Husky) -> tuple[str, ...]:
-    said = []
-    rolling = _rolling(recording)
-    radius = husky.parameters['wheel_radius']
-    if rolling is not None:
-        mean, forward = rolling
-        # Medians: single jumps of a localisation do not count.
-        ratio = float(np.median(forward / mean))
-        if abs(ratio) < limits()['no_ground_reaction'] * radius:
-            said.append(f'wheels off the ground: they turn, and the robot moves {ratio:.3f} m per '
-                        f'radian where a wheel of {radius:g} m rolls; or the pose is not that of '
-                        'this robot')
-        elif abs(ratio / radius - 1.0) > limits()['other_wheel']:
-            said.append(f'this is no Husky: its wheels roll {ratio:.3f} m per radian where the '
-                        f'model has {radius:g} m (or wheel rates are scaled); give its '
-                        'dimensions in a model file of its own')
+def _number(one: Number, digits: int) -> str:
+    return f'{one.value:.{digits}f} ±{0.5 * (one.high - one.low):.{digits}f}'
+
+
+def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relation]
+                    ) -> tuple[str, ...]:
+    said = [one.statement for one in faults(related)]
+    for one in differences(related, husky.parameters):
+        said.append(one.statement if not one.on_ground else (
+            f'this is no Husky: {one.statement} (or wheel rates are scaled); give its dimensions '
+            'in a model file of its own'))
     fastest = max((float(np.abs(series.column('forward')).max()) for name, series in
                    recording.streams.items() if name == 'command' and len(series)), default=0.0)
     if fastest > limits()['fastest_husky']:

@@ -25,9 +25,20 @@ from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts
 from lg_husky_sim.diagnosis.localisation import mismatches, Missing, missing_efforts
-from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
+from lg_husky_sim.diagnosis.misfit import Misfit, misfit, unsearched
+from lg_husky_sim.diagnosis.result import Diagnosis, Rivalry, Verdict
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
+from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
+from lg_husky_sim.diagnosis.sensors.relations import relations
+from lg_husky_sim.diagnosis.sensors.repair import (
+    begun_with,
+    certain,
+    fault_findings,
+    UNMODELLED,
+)
+from lg_husky_sim.diagnosis.sensors.robot import differences, impossible
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
@@ -87,30 +98,60 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     recordings, _ = named_apart(recordings, ())
     drives = drives_of(recordings)
     names = [r.name for r in recordings]
+    parts = tuple(s for r in recordings for s in segments(r))
+    progress('sensors against each other', 0.01)
+    related = relations(parts)
+    seen, different = faults(related), differences(related, nominal.parameters)
+    numbers = nominal.parameters.replacing({k: v for d in different for k, v in d.numbers.items()})
     with one_thread(), ThreadPoolExecutor(max(jobs, 1)) as pool:
-        start = beginning(nominal.structure, base_unknowns(nominal.parameters, drives),
-                          nominal.parameters, Reading())
+        start = beginning(nominal.structure, base_unknowns(numbers, drives), numbers, Reading())
+        start, there = begun_with(start, certain(seen))
         progress('noise', 0.02)
         evidence = evidence_of(drives, names, start, first_guess(drives), pool)
-        found = search(evidence, start, progress)
+        if different:
+            progress('recalibration', 0.05)
+        found = unsearched(evidence, start) if different else search(evidence, start, progress)
+        different = different or impossible(found.final, nominal.parameters)
         progress('smooth efforts', 0.85)
         rest = efforts(found.evidence, found.final)
         free = missing_efforts(found.evidence, found.final)
         progress('numbers', 0.9)
-        parts = tuple(s for r in recordings for s in segments(r))
-        said, features = _diagnosis(found, rest, free, parts, nominal)
-    notes = (*said.notes, *_mended(recordings))
-    return Case(replace(said, notes=notes), found, parts, nominal, rest, features)
+        said, features = _diagnosis(found, rest, free, parts, nominal, there)
+        if different:
+            progress('another robot: what differs', 0.92)
+            sized = ModelFile(start.structure, start.numbers)
+            said = _of_other_robot(said, misfit(
+                different, found, said.held_out_plain, recordings, parts, sized, there, pool))
+    sensors = tuple(f.statement for f in seen)
+    return Case(replace(said, notes=(*said.notes, *_mended(recordings)), sensors=sensors), found,
+                parts, nominal, rest, features)
+
+
+def _of_other_robot(said: Diagnosis, other: Misfit) -> Diagnosis:
+    # The names of a search that ended on another robot are rivals, and no answer.
+    sensors = tuple(f for f in said.findings if f.subsystem == Subsystem.SENSOR.value
+                    and f.statement.endswith(UNMODELLED))
+    rivals = tuple(Rivalry(f.effect, f.side, f.held_out_gain) for f in said.findings
+                   if f not in sensors and f.effect != 'unknown')
+    return replace(
+        said, verdict=Verdict.UNKNOWN, findings=(replace(other.finding, rivals=rivals), *sensors),
+        indistinguishable=(), model=other.model or said.plain_model,
+        augmented=other.everywhere or said.plain,
+        held_out_augmented=other.held_out or said.held_out_plain, fits=False)
 
 
 def _diagnosis(found: Search, rest: Sequence[Effort], free: Sequence[Missing],
-               parts: Sequence[Segment], nominal: ModelFile) -> tuple[Diagnosis, Features]:
+               parts: Sequence[Segment], nominal: ModelFile, there: Sequence[Fault]
+               ) -> tuple[Diagnosis, Features]:
     said = answer(found, rest, free)
+    sensors = fault_findings(there, found.final)
+    if sensors and said.verdict is Verdict.NOTHING_MISSING:
+        said = replace(said, verdict=Verdict.KNOWN)
     match said.verdict:
         case Verdict.KNOWN:
-            names = findings(found)
+            names = (*sensors, *(findings(found) if found.found else ()))
         case Verdict.UNKNOWN:
-            names = (unknown_finding(found, rest, free),)
+            names = (unknown_finding(found, rest, free), *sensors)
         case Verdict.NOTHING_MISSING:
             names = ()
     culprit = names[0].subsystem if names else None

@@ -31,6 +31,8 @@ def headline(diagnosis: Diagnosis, changed: bool = False) -> str:
             return ('No change found: the model of the earlier recordings explains the later ones.'
                     if changed else
                     'No missing physics found: the recalibrated model explains the recordings.')
+        case Verdict.UNKNOWN if not diagnosis.fits:
+            return 'This model does not fit this robot.'
         case Verdict.UNKNOWN:
             return ('Something has changed that is not in the catalogue.' if changed else
                     'Something is missing that is not in the catalogue.')
@@ -69,7 +71,9 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
             finding.chance) else ''
         rivals = [f'{r.effect} {r.held_out_gain:.0f}' for r in finding.rivals
                   if r.held_out_gain > 0.0]
-        lines.append(f'    {evidence}competing effects: {", ".join(rivals) or "none with a gain"}')
+        if diagnosis.fits or rivals:
+            lines.append(f'    {evidence}competing effects: '
+                         f'{", ".join(rivals) or "none with a gain"}')
     for group in diagnosis.indistinguishable:
         lines.append(f'  cannot be told apart: {", ".join(group.effects)}; '
                      f'would separate them: {"; ".join((*group.sensors, *group.manoeuvres))}')
@@ -78,6 +82,7 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
     for label, *cells in error_table(diagnosis):
         lines.append(f'  {label:22} {cells[0]:>12} {cells[1]:>12}   {cells[2]:>12} {cells[3]:>12}')
     lines.append(f'  remaining: {diagnosis.remaining}')
+    lines.extend(f'  sensors against each other: {text}' for text in diagnosis.sensors)
     lines.extend(f'  note: {note}' for note in diagnosis.notes)
     return '\n'.join(lines)
 

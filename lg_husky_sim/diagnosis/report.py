@@ -116,6 +116,9 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
             words = ('The model of the earlier recordings explains the later ones.' if changed
                      else 'The recalibrated model explains the recordings.')
             return Headline(text, Tone.GOOD, (sure,), (words,), tuple(warnings))
+        case Verdict.UNKNOWN if not diagnosis.fits:
+            return Headline('This model does not fit this robot', Tone.BAD, (sure,),
+                            sentences, tuple(warnings))
         case Verdict.UNKNOWN:
             parts = ', '.join(dict.fromkeys(one.subsystem for one in found))
             text = 'Something has changed' if changed else 'Something is missing'
@@ -199,6 +202,10 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
     robot: list[str] = []
     simulator: list[str] = []
     for finding in diagnosis.findings:
+        if finding.effect == 'unknown' and not diagnosis.fits:
+            robot.append('Check the robot, its wheels and the frames of its pose; for another '
+                         'robot, give a model of its own: `--robot FILE.yaml`.')
+            continue
         if finding.effect == 'unknown':
             robot.append('Check the part of the robot that the report names, at the times that it '
                          'lists: no effect of the catalogue behaves like this.')
@@ -317,8 +324,11 @@ def report_data(
              RECALIBRATED: 'its parameters refitted within their tolerances, nothing added',
              WITH_FINDING: f'refitted with {what}'
              if diagnosis.verdict is Verdict.KNOWN else
+             'a commercial base: limited commands, wheel-speed loop, tyres that saturate'
+             if not diagnosis.fits else
              'refitted with a smooth description of what is missing'}
-    notes = (*diagnosis.notes, *((f'What remains: {diagnosis.remaining}.',)
+    notes = (*(f'Sensors against each other: {text}.' for text in diagnosis.sensors),
+             *diagnosis.notes, *((f'What remains: {diagnosis.remaining}.',)
                                  if diagnosis.remaining else ()))
     return ReportData(
         f'{"What changed in " if changed else "Diagnosis of "}{", ".join(recordings)}',

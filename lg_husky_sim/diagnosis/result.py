@@ -159,6 +159,10 @@ class Diagnosis:
     notes : tuple of str
     features : mapping of str to float
         What the confidence was made of, by name.
+    sensors : tuple of str
+        What streams say of each other where they contradict, without a model.
+    fits : bool
+        Whether the model is one of this robot at all.
     """
 
     verdict: Verdict
@@ -176,6 +180,8 @@ class Diagnosis:
     plain_model: ModelFile
     notes: tuple[str, ...] = field(default=())
     features: Mapping[str, float] = field(default_factory=dict)
+    sensors: tuple[str, ...] = ()
+    fits: bool = True
 
 
 def _number(value: float) -> float | None:
@@ -255,5 +261,7 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
                 'held_out': {'plain': _errors(diagnosis.held_out_plain),
                              'augmented': _errors(diagnosis.held_out_augmented)}},
         'remaining': diagnosis.remaining,
+        'sensors': list(diagnosis.sensors),
+        'model_fits_robot': diagnosis.fits,
         'notes': list(diagnosis.notes),
     }

@@ -1,0 +1,105 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Faults of sensors that are taken off before any model is fitted.
+
+A gyro with the wrong sign, or a stream that is late by more than a body can be, would be taken for
+physics by every number of the model. The search therefore begins with them in the model, and
+refines their numbers with the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from lg_husky_sim.diagnosis.conclusion import estimates
+from lg_husky_sim.diagnosis.evidence.evidence import Fit, Point
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
+from lg_husky_sim.diagnosis.result import Estimate, Finding
+from lg_husky_sim.diagnosis.sensors.faults import Fault
+from lg_husky_sim.errors import ParameterError
+from scipy.stats import norm
+
+#: What the statement of such a fault ends in.
+UNMODELLED = 'No model of the robot is needed to see it.'
+
+
+def certain(found: Sequence[Fault]) -> tuple[Fault, ...]:
+    """
+    Return the faults that a search begins with.
+
+    Parameters
+    ----------
+    found : sequence of Fault
+
+    Returns
+    -------
+    tuple of Fault
+        All that the catalogue has if a sign or a stamp is wrong; none otherwise, since factors
+        and offsets are in no one's way.
+    """
+    named = [f for f in found if f.effect is not None and f.number is not None]
+    gross = any(f.number is not None and (
+        f.number.unit == 's' or (f.number.unit == '1' and f.number.value < 0.0)) for f in named)
+    return tuple(named) if gross else ()
+
+
+def begun_with(start: Point, found: Sequence[Fault]) -> tuple[Point, tuple[Fault, ...]]:
+    """
+    Return a point with faults in it.
+
+    Parameters
+    ----------
+    start : Point
+    found : sequence of Fault
+        Of :func:`certain`.
+
+    Returns
+    -------
+    Point
+    tuple of Fault
+        Those that it has: a model holds no two of one kind.
+    """
+    put = []
+    for fault in found:
+        if fault.effect is None or fault.number is None:
+            continue
+        numbers = {fault.number.name: fault.number.value}
+        try:
+            start = Hypothesis(fault.effect, (numbers,)).point(start, numbers)
+        except ParameterError:
+            continue
+        put.append(fault)
+    return start, tuple(put)
+
+
+def fault_findings(found: Sequence[Fault], fit: Fit | None = None) -> tuple[Finding, ...]:
+    """
+    Return faults as findings.
+
+    Parameters
+    ----------
+    found : sequence of Fault
+        With an effect of the catalogue.
+    fit : Fit, optional
+        With the faults in it, for their numbers; else those of the streams are given.
+
+    Returns
+    -------
+    tuple of Finding
+    """
+    gains = [0.5 * f.certainty ** 2 for f in found]
+    total = sum(gains) or 1.0
+    made = []
+    for fault, gain in zip(found, gains, strict=True):
+        if fault.effect is None or fault.number is None:
+            continue
+        numbers: tuple[Estimate, ...] = (fault.number,)
+        if fit is not None:
+            numbers = estimates(fit, [fault.number.name], fit.point.numbers)
+        kind = fault.effect.kind
+        made.append(Finding(
+            fault.effect.id, fault.effect.side, kind.subsystem.value, kind.elements,
+            'everywhere', None, numbers, gain, 2.0 * float(norm.sf(fault.certainty)),
+            min(1.0, gain / total), (), f'{fault.statement}. {UNMODELLED}'))
+    return tuple(made)

@@ -1,0 +1,164 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors against each other, without a model: which is at fault, and whose robot it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.output import headline
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
+from lg_husky_sim.diagnosis.sensors.relations import relations
+from lg_husky_sim.diagnosis.sensors.robot import differences
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import Recording, segments
+from lg_husky_sim.signals import FloatArray, TimeSeries
+import numpy as np
+import pytest
+
+Make = Callable[..., Recording]
+
+
+@pytest.fixture(scope='module')
+def clean(drive: Make) -> Recording:
+    return drive('clean', 'nothing', 3)
+
+
+def changed(recording: Recording, **streams: TimeSeries | None) -> Recording:
+    """Return a recording with streams exchanged, or left out where they are None."""
+    merged = {**recording.streams, **streams}
+    return replace(recording, streams={k: v for k, v in merged.items() if v is not None})
+
+
+def late(series: TimeSeries, seconds: float) -> TimeSeries:
+    return TimeSeries(series.times + seconds, series.values, series.names)
+
+
+def scaled(series: TimeSeries, factors: FloatArray | float, offset: FloatArray | float = 0.0
+           ) -> TimeSeries:
+    return TimeSeries(series.times, series.values * factors + offset, series.names)
+
+
+def found(recording: Recording) -> tuple[Fault, ...]:
+    return faults(relations(segments(recording)))
+
+
+def names(recording: Recording) -> list[str]:
+    return [one.effect.id if one.effect else '' for one in found(recording)]
+
+
+@pytest.mark.parametrize('part', ['nothing', 'command', 'drivetrain', 'translation', 'rotation'])
+def test_sensors_in_order_are_not_accused_whatever_the_robot_lacks(part: str, drive: Make) -> None:
+    assert found(drive('one', part, 5)) == ()
+
+
+def test_a_reversed_gyro_is_found_by_the_pose_and_by_the_wheels_alone(clean: Recording) -> None:
+    imu = scaled(clean.stream('imu'), np.array([-1.0, 1.0, 1.0]))
+    for recording in (changed(clean, imu=imu), changed(clean, imu=imu, pose=None)):
+        one = found(recording)[0]
+        assert one.effect is not None
+        assert one.effect.id == 'gyro_sign'
+        assert one.number is not None
+        assert one.number.value == pytest.approx(-1.0, abs=0.05)
+
+
+@pytest.mark.parametrize('seconds', [0.3, -0.35])
+@pytest.mark.parametrize('stream', ['imu', 'pose'])
+def test_the_late_one_of_three_streams_is_named_with_its_lateness(
+        stream: str, seconds: float, clean: Recording) -> None:
+    one = found(changed(clean, **{stream: late(clean.stream(stream), seconds)}))[0]
+    assert one.effect is not None
+    assert (one.effect.id, one.effect.shape) == ('sensor_time_offset', stream)
+    assert one.number is not None
+    assert one.number.value == pytest.approx(seconds, abs=0.03)
+    assert ('later' if seconds > 0.0 else 'earlier') in one.statement
+
+
+def test_late_wheels_are_told_from_a_body_that_follows_its_wheels(clean: Recording) -> None:
+    one = found(changed(clean, wheels=late(clean.stream('wheels'), 0.4)))[0]
+    assert one.stream == 'wheels'
+    assert one.number is not None
+    assert one.number.value == pytest.approx(0.3, abs=0.15)
+
+
+def test_of_two_streams_no_one_is_accused_but_the_contradiction_is_said(clean: Recording) -> None:
+    faulty = changed(clean, pose=None, imu=late(clean.stream('imu'), -0.5))
+    one, = found(faulty)
+    assert one.effect is None
+    assert one.statement.startswith('The stamps of the wheels')
+    assert 'third stream' in one.statement
+
+
+def test_factor_and_offset_of_a_gyro_are_measured(clean: Recording) -> None:
+    imu = scaled(clean.stream('imu'), np.array([1.1, 1.0, 1.0]), np.array([0.03, 0.0, 0.0]))
+    by_name: Mapping[str, Fault] = {
+        one.effect.id: one for one in found(changed(clean, imu=imu)) if one.effect}
+    factor, bias = by_name['gyro_scale'].number, by_name['gyro_bias'].number
+    assert factor is not None
+    assert factor.low < 1.1 < factor.high
+    assert bias is not None
+    assert bias.value == pytest.approx(0.03, abs=0.004)
+
+
+def test_interchanged_sides_and_reversed_wheels_are_told(clean: Recording) -> None:
+    wheels = clean.stream('wheels')
+    swapped = TimeSeries(wheels.times, wheels.values[:, ::-1], wheels.names)
+    assert 'interchanged' in found(changed(clean, wheels=swapped))[0].statement
+    assert 'backwards' in found(changed(clean, wheels=scaled(wheels, -1.0)))[0].statement
+
+
+def test_a_pose_that_jumps_accuses_nobody(clean: Recording) -> None:
+    pose = clean.stream('pose')
+    values = np.array(pose.values)
+    values[200:, :2] += 1.5
+    assert names(changed(clean, pose=TimeSeries(pose.times, values, pose.names))) == []
+
+
+def test_a_shift_of_the_whole_bag_changes_no_relation(clean: Recording) -> None:
+    moved = replace(clean, streams={k: late(s, 1000.0) for k, s in clean.streams.items()})
+    for one, other in zip(relations(segments(clean)), relations(segments(moved)), strict=True):
+        assert other.factor.value == pytest.approx(one.factor.value, rel=1e-6)
+        assert other.late.value == pytest.approx(one.late.value, abs=1e-5)
+
+
+def test_a_deflated_wheel_is_still_this_robot_and_one_twice_as_large_is_not(
+        clean: Recording) -> None:
+    parameters = load_model().parameters
+
+    def differs(factor: float) -> bool:
+        wheels = scaled(clean.stream('wheels'), 1.0 / factor)
+        return bool(differences(relations(segments(changed(clean, wheels=wheels))), parameters))
+    assert not differs(0.9)
+    assert not differs(1.1)
+    assert differs(2.0)
+
+
+def silent(text: str, share: float) -> None:
+    del text, share
+
+
+def test_wheels_off_the_ground_are_said_to_be_that_and_nothing_else(clean: Recording) -> None:
+    pose = clean.stream('pose')
+    values = 0.003 * np.random.default_rng(1).standard_normal(pose.values.shape)
+    still = changed(clean, imu=None, pose=TimeSeries(pose.times, values, pose.names))
+    diagnosis = diagnose([still], load_model(), silent).diagnosis
+    assert diagnosis.verdict is Verdict.UNKNOWN
+    assert not diagnosis.fits
+    assert diagnosis.findings[0].subsystem == 'traction'
+    assert 'no ground reaction' in diagnosis.findings[0].statement
+
+
+def test_another_robot_is_refused_and_its_reversed_gyro_found_all_the_same(
+        clean: Recording) -> None:
+    imu = scaled(clean.stream('imu'), np.array([-1.0, 1.0, 1.0]))
+    large = changed(clean, imu=imu, wheels=scaled(clean.stream('wheels'), 0.5))
+    diagnosis = diagnose([large], load_model(), silent).diagnosis
+    assert not diagnosis.fits
+    assert headline(diagnosis) == 'This model does not fit this robot.'
+    assert 'This model does not fit this robot: its wheels roll' in diagnosis.findings[0].statement
+    assert 'commercial base' in diagnosis.model.about or diagnosis.model == diagnosis.plain_model
+    assert [f.effect for f in diagnosis.findings] == ['unknown', 'gyro_sign']
+    assert any('wrong sign' in text for text in diagnosis.sensors)
