@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 import math
@@ -51,7 +51,7 @@ def unsearched(evidence: Evidence, start: Point) -> Search:
     return Search(plain, plain, evidence, (Round(evidence, plain, (), False, 1.0),), ())
 
 
-def misfit(found: Sequence[Difference], search: Search, plain_out: dict[str, float],
+def misfit(found: Sequence[Difference], search: Search, plain_out: Mapping[str, float],
            recordings: Sequence[Recording], parts: Sequence[Segment], nominal: ModelFile,
            faults: Sequence[Fault], pool: ThreadPoolExecutor) -> Misfit:
     """
@@ -62,7 +62,7 @@ def misfit(found: Sequence[Difference], search: Search, plain_out: dict[str, flo
     found : sequence of Difference
         At least one.
     search : Search
-    plain_out : dict of str to float
+    plain_out : mapping of str to float
         Errors of the recalibrated model on held-out data.
     recordings : sequence of Recording
     parts : sequence of Segment
@@ -101,14 +101,14 @@ def misfit(found: Sequence[Difference], search: Search, plain_out: dict[str, flo
     return Misfit(finding, base.model, out, everywhere)
 
 
-def _better(plain: dict[str, float], base: dict[str, float]) -> bool:
+def _better(plain: Mapping[str, float], base: Mapping[str, float]) -> bool:
     shared = [name for name in ('wheel_speed_rmse', 'yaw_rate_rmse', 'forward_rmse')
               if name in plain and name in base]
     return bool(shared) and math.prod(base[n] / max(plain[n], 1e-12) for n in shared) < 1.0
 
 
-def _said(base: CommercialBase | None, better: bool, plain: dict[str, float],
-          out: dict[str, float]) -> str:
+def _said(base: CommercialBase | None, better: bool, plain: Mapping[str, float],
+          out: Mapping[str, float]) -> str:
     if base is None:
         return ''
     words = base.words[0].upper() + base.words[1:]
