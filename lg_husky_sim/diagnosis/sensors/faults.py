@@ -171,8 +171,13 @@ def _late(known: Known) -> list[Fault]:
         bad = [name for name, one in wheels.items() if _unphysical(one)]
         if len(bad) == 1:
             other = 'pose' if bad[0] == 'imu' else 'imu'
-            return [_stamps(bad[0], _turned_about(gyro.late, bad[0] == 'pose'),
-                            (other, 'wheels'))]
+            late = _turned_about(gyro.late, bad[0] == 'pose')
+            by_wheels = wheels[bad[0]]
+            if by_wheels is not None:
+                # Clocks that drift: no better than the two others agree.
+                second = _turned_about(by_wheels.late, True)
+                late = Number(late.value, min(late.low, second.low), max(late.high, second.high))
+            return [_stamps(bad[0], late, (other, 'wheels'))]
         return [_pair('imu', 'pose', gyro)]
     return [_pair('wheels', name, one) for name, one in wheels.items()
             if one is not None and _unphysical(one)]
