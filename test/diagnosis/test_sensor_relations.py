@@ -6,13 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.evidence.unknowns import effect_unknowns, model_unknown
 from lg_husky_sim.diagnosis.output import headline
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
 from lg_husky_sim.diagnosis.sensors.relations import relations
-from lg_husky_sim.diagnosis.sensors.robot import differences
+from lg_husky_sim.diagnosis.sensors.robot import differences, impossible
+from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording, segments
 from lg_husky_sim.signals import FloatArray, TimeSeries
@@ -134,6 +138,33 @@ def test_a_deflated_wheel_is_still_this_robot_and_one_twice_as_large_is_not(
     assert not differs(0.9)
     assert not differs(1.1)
     assert differs(2.0)
+
+
+@pytest.mark.parametrize(('name', 'value', 'impossible_'), [
+    ('payload_mass', 30.0, False), ('payload_mass', 300.0, True), ('mass', 60.0, False),
+    ('mass', 200.0, True)])
+def test_a_payload_of_hundreds_of_kilograms_is_another_robot(name: str, value: float,
+                                                             impossible_: bool) -> None:
+    model = load_model()
+    payload = Effect('payload')
+    numbers = model.parameters.with_entries(
+        *(p.parameter() for p in payload.parameters())).replacing({name: value})
+    entry = model.parameters.entry('mass')
+    unknowns = (model_unknown(entry), *effect_unknowns(payload, {
+        p.name: numbers[p.name] for p in payload.parameters()}))
+    strain = np.array([np.log(numbers['mass'] / entry.value) / entry.tolerance] + [0.0] * (
+        len(unknowns) - 1))
+    fit: Any = SimpleNamespace(point=SimpleNamespace(
+        unknowns=unknowns, strain=strain, numbers=numbers))
+    assert bool(impossible(fit, model.parameters)) is impossible_
+
+
+def test_readings_that_are_no_numbers_are_left_out(clean: Recording) -> None:
+    imu = clean.stream('imu')
+    values = np.array(imu.values)
+    values[5, 0] = np.nan
+    left = relations(segments(changed(clean, imu=TimeSeries(imu.times, values, imu.names))))
+    assert {(one.source, one.reference) for one in left} == {('wheels', 'pose')}
 
 
 def silent(text: str, share: float) -> None:

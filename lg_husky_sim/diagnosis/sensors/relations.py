@@ -183,7 +183,8 @@ def _relation(parts: Sequence[Segment], quantity: str, names: tuple[str, str],
     ways, intervals = [], []
     for part in parts:
         source, reference = own(part), other(part)
-        if source is None or reference is None or min(source[0].size, reference[0].size) < 4:
+        if source is None or reference is None or min(source[0].size, reference[0].size) < 4 or (
+                not np.all(np.isfinite(source[1])) or not np.all(np.isfinite(reference[1]))):
             continue
         start = max(source[0][0], reference[0][0]) + reach
         end = min(source[0][-1], reference[0][-1]) - reach
@@ -215,11 +216,14 @@ def _robust(table: FloatArray, reference: FloatArray) -> tuple[FloatArray, Float
     # Coefficients, what they leave, and weights: single jumps of a pose do not count.
     weight = np.ones(reference.size)
     best: FloatArray = np.zeros(table.shape[1])
+    # At rest nothing is left at all: weights shall not be those of rounding.
+    least = max(setting('least_spread') * float(np.sqrt(np.mean(reference ** 2))),
+                float(np.finfo(float).tiny))
     for _ in range(int(setting('reweighted'))):
         best = np.asarray(np.linalg.lstsq(
             table * weight[:, None], reference * weight, rcond=None)[0], dtype=np.float64)
         left = reference - table @ best
-        wide = max(_spread(left), float(np.finfo(float).tiny))
+        wide = max(_spread(left), least)
         weight = 1.0 / np.sqrt(1.0 + (left / (setting('outlier') * wide)) ** 2)
     return best, reference - table @ best, weight
 

@@ -95,19 +95,27 @@ def impossible(fit: Fit, parameters: Parameters) -> tuple[Difference, ...]:
     tuple of Difference
         One for all of them, or none.
     """
-    most = setting('impossible')
-    strained = [(u.name, abs(float(s))) for u, s in zip(
-        fit.point.unknowns, fit.point.strain, strict=True) if u.kind == 'model' and abs(s) > most]
-    if not strained:
+    most, load = setting('impossible'), setting('largest_load')
+    numbers = fit.point.numbers
+    said, certainty = [], 0.0
+    for unknown, strain in zip(fit.point.unknowns, fit.point.strain, strict=True):
+        name = unknown.name
+        if unknown.kind == 'log':
+            continue
+        words = f'{name.replace("_", " ")} {numbers[name]:.3g}{_unit(numbers, name)}'
+        if unknown.kind == 'model' and abs(strain) > most:
+            said.append(f'{words} where the model has {parameters[name]:.3g}')
+            certainty = max(certainty, abs(float(strain)))
+        elif unknown.kind == 'effect' and numbers.entry(name).unit == 'kg' and (
+                numbers[name] > load):
+            said.append(f'{words} where {load:g} kg are the most that it carries')
+            certainty = max(certainty, most)
+    if not said:
         return ()
-    values = fit.point.numbers
-    words = ', '.join(
-        f'{name.replace("_", " ")} {values[name]:.3g}{_unit(parameters, name)} where the model '
-        f'has {parameters[name]:.3g}' for name, _ in strained)
     return (Difference(
         'drivetrain', (), 'everywhere',
-        f'to follow it, the model would need numbers that no such robot has ({words})',
-        max(s for _, s in strained)),)
+        f'to follow it, the model would need numbers that no such robot has ({"; ".join(said)})',
+        certainty),)
 
 
 def _unit(parameters: Parameters, name: str) -> str:
