@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+import struct
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.recording import read_recording, write_recording
-from lg_husky_sim.recording.salvage import is_cut_off
+from lg_husky_sim.recording.salvage import is_cut_off, MAGIC
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
@@ -16,6 +17,9 @@ import pytest
 pytest.importorskip('rosbags')
 
 SAMPLES = 40_000
+#: Records of MCAP by their code, and what begins each.
+MESSAGE, CHUNK, MESSAGE_INDEX, DATA_END = 0x05, 0x06, 0x07, 0x0F
+HEAD = struct.Struct('<BQ')
 
 
 @pytest.fixture(scope='module')
@@ -62,3 +66,36 @@ def test_a_bag_cut_before_its_first_chunk_is_refused_in_a_line(
         with pytest.raises(RecordingError, match=r'cannot (read|use) ') as caught:
             read_recording(cut)
         assert '\n' not in str(caught.value)
+
+
+def unchunked(data: bytes) -> bytes:
+    """Return an MCAP file with its messages outside of chunks, as rosbag2's `fastwrite` has it."""
+    from rosbags.rosbag2.storage_mcap import decompress
+    records = [MAGIC]
+    place = len(MAGIC)
+    while data[place] != DATA_END:
+        code, length = HEAD.unpack_from(data, place)
+        end = place + HEAD.size + length
+        if code == CHUNK:
+            body = data[place + HEAD.size:end]
+            size, checksum, name = struct.unpack_from('<QII', body, 16)
+            records.append(decompress(body[40 + name:], body[32:32 + name].decode(), size,
+                                      checksum))
+        elif code != MESSAGE_INDEX:
+            records.append(data[place:end])
+        place = end
+    return b''.join(records)
+
+
+@pytest.mark.parametrize('left_over', [0, 1, 9, 40])
+def test_messages_outside_of_chunks_are_read_up_to_the_last_whole_one(
+        sound: Path, tmp_path: Path, left_over: int) -> None:
+    """What a killed recorder leaves where rosbag2_py writes: no chunks, no index, no metadata."""
+    whole = unchunked((sound / 'bag.mcap').read_bytes())
+    cut = tmp_path / 'bag'
+    cut.mkdir()
+    # The rest of a message that did not get into the file.
+    (cut / 'bag_0.mcap').write_bytes(
+        whole + HEAD.pack(MESSAGE, 300)[:left_over] + bytes(max(0, left_over - HEAD.size)))
+    rates = read_recording(cut).streams['imu'].column('yaw_rate')
+    np.testing.assert_array_equal(rates, np.arange(SAMPLES))

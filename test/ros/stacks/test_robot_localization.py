@@ -43,7 +43,8 @@ CONFIG = """\
 
 def ekf_node() -> Path | None:
     """Return the filter's program, or None where it is not installed."""
-    if find_spec('rclpy') is None or find_spec('ament_index_python') is None:
+    if find_spec('rclpy') is None or find_spec('ament_index_python') is None or (
+            not os.environ.get('AMENT_PREFIX_PATH')):
         return None
     packages = import_module('ament_index_python.packages')
     try:
