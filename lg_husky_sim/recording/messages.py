@@ -5,13 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
-
-if TYPE_CHECKING:
-    from rosbags.typesys.store import Typestore
 
 WHEELS = ('front_left_wheel', 'front_right_wheel', 'rear_left_wheel', 'rear_right_wheel')
 """Joint names of the Husky, in its order: left and right take turns."""
@@ -25,17 +22,18 @@ Maker = tuple[str, str, FloatArray, Callable[[int, int], Any]]
 
 class Messages:
     """
-    Makes messages of one type store.
+    Makes messages of a library's types.
 
     Parameters
     ----------
-    store : rosbags type store
+    types : mapping of str to callable
+        What makes a message from its fields in order, by the full name of its type.
     frames : tuple of str
         Parent and child frame of the pose.
     """
 
-    def __init__(self, store: Typestore, frames: tuple[str, str]) -> None:
-        self._types = store.types
+    def __init__(self, types: Mapping[str, Callable[..., Any]], frames: tuple[str, str]) -> None:
+        self._types = types
         self._frames = frames
 
     def makers(self, streams: Mapping[str, TimeSeries]) -> list[Maker]:

@@ -6,22 +6,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 import heapq
+from importlib.util import find_spec
 from os import PathLike, replace
 from pathlib import Path
 import tempfile
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.extras import require
 from lg_husky_sim.recording.messages import Maker, Messages
 from lg_husky_sim.recording.recording import check_stream
+from lg_husky_sim.recording.rosbag2 import available, Rosbag2Output
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
-    from rosbags.typesys.store import Typestore
 
+Types = Mapping[str, Callable[..., Any]]
 STORAGES = ('mcap', 'sqlite3')
 START_NS = 1_700_000_000_000_000_000
 """Time zero of a recording that was never made on a clock; not 0, for a zero stamp means none."""
@@ -69,11 +71,11 @@ def write_recording(
     RecordingError
         If something is at `path` already, a stream is unknown or the storage is.
     MissingExtraError
-        If the package `rosbags` is not installed.
+        If neither `rosbags` nor ROS's `rosbag2_py` is installed.
     """
     for name, series in streams.items():
         check_stream(name, series)
-    return _whole(Path(path), lambda store: Messages(store, frames).makers(streams), storage,
+    return _whole(Path(path), lambda types: Messages(types, frames).makers(streams), storage,
                   start_ns, overwrite)
 
 
@@ -117,22 +119,28 @@ def write_signals(
     RecordingError
         If something is at `path` already, or the storage is unknown.
     MissingExtraError
-        If the package `rosbags` is not installed.
+        If neither `rosbags` nor ROS's `rosbag2_py` is installed.
     """
-    def makers(store: Typestore) -> list[Maker]:
-        messages = Messages(store, (frame, ''))
+    def makers(types: Types) -> list[Maker]:
+        messages = Messages(types, (frame, ''))
         return [*(messages.number(topic, series) for topic, series in signals.items()),
                 *(messages.posed(topic, series) for topic, series in poses.items())]
     return _whole(Path(path), makers, storage, start_ns, overwrite)
 
 
-def _whole(target: Path, makers: Callable[[Typestore], list[Maker]], storage: str,
+def _by_ros() -> bool:
+    """Return whether ROS has to write, because the package rosbags is not there."""
+    return find_spec('rosbags') is None and available()
+
+
+def _whole(target: Path, makers: Callable[[Types], list[Maker]], storage: str,
            start_ns: int, overwrite: bool) -> Path:
     """Write a bag under another name first, so that it appears whole or not at all."""
     if storage not in STORAGES:
         raise RecordingError(f'storage {storage!r} is unknown; there are {", ".join(STORAGES)}')
     check_target(target, overwrite=overwrite)
-    require('rosbags', 'write recordings')
+    if not _by_ros():
+        require('rosbags', 'write recordings')
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=target.parent) as scratch:
         made = Path(scratch) / target.name  # files inside a bag carry the bag's name
@@ -162,25 +170,46 @@ def check_target(path: Path, *, overwrite: bool = False) -> None:
         raise RecordingError(f'{path} exists and is not a rosbag2, so it is not overwritten')
 
 
-def _write(path: Path, makers: Callable[[Typestore], list[Maker]], storage: str, start_ns: int
-           ) -> None:
-    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-    from rosbags.typesys import get_typestore, Stores
+class _RosbagsOutput:
+    # As Rosbag2Output, by the package rosbags.
 
-    store = get_typestore(Stores.ROS2_JAZZY)
-    plugin = StoragePlugin.MCAP if storage == 'mcap' else StoragePlugin.SQLITE3
-    writer = Writer(path, version=9, storage_plugin=plugin)
-    if plugin is StoragePlugin.MCAP:  # a fifth of the size; rosbag2 reads it as it is
-        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    with writer:
-        made = makers(store)
-        connections: list[Connection] = [
-            writer.add_connection(topic, kind, typestore=store) for topic, kind, _, _ in made]
+    def __init__(self, path: Path, storage: str) -> None:
+        from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+        from rosbags.typesys import get_typestore, Stores
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP
+                              if storage == 'mcap' else StoragePlugin.SQLITE3)
+        if storage == 'mcap':  # a fifth of the size; rosbag2 reads it as it is
+            self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        self._connections: list[Connection] = []
+        self.types: Types = self._store.types
+
+    def __enter__(self) -> _RosbagsOutput:
+        self._writer.open()
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self._writer.close()
+
+    def add(self, topic: str, kind: str) -> None:
+        self._connections.append(
+            self._writer.add_connection(topic, kind, typestore=self._store))
+
+    def write(self, place: int, stamp: int, message: Any) -> None:
+        one = self._connections[place]
+        self._writer.write(one, stamp, self._store.serialize_cdr(message, one.msgtype))
+
+
+def _write(path: Path, makers: Callable[[Types], list[Maker]], storage: str, start_ns: int
+           ) -> None:
+    kind = Rosbag2Output if _by_ros() else _RosbagsOutput
+    with kind(path, storage) as bag:
+        made = makers(bag.types)
+        for topic, name, _, _ in made:
+            bag.add(topic, name)
         rows = [_rows(place, times, start_ns) for place, (_, _, times, _) in enumerate(made)]
         for stamp, place, index in heapq.merge(*rows):
-            _, kind, _, make = made[place]
-            raw = store.serialize_cdr(make(index, stamp), kind)
-            writer.write(connections[place], stamp, raw)
+            bag.write(place, stamp, made[place][3](index, stamp))
 
 
 def _rows(place: int, times: FloatArray, start_ns: int) -> Iterator[tuple[int, int, int]]:

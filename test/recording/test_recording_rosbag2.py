@@ -1,21 +1,23 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Reading by ROS's own rosbag2_py gives what reading by rosbags gives.
+Reading and writing by ROS's own rosbag2_py gives what rosbags gives.
 
 The module is stood in for by one with the signatures of rosbag2_py in Jazzy (pybind11 sources of
-rosbag2, branch jazzy), so that the way there and back is tested where ROS is not installed.
+rosbag2, branch jazzy), so that the way there and back is tested where ROS is not installed. Where
+rclpy is, messages are made and serialised by it.
 """
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 import sys
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from lg_husky_sim.errors import RecordingError
-from lg_husky_sim.recording import bags, read_recording, write_recording
+from lg_husky_sim.recording import bags, read_recording, write_recording, writer
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
@@ -58,24 +60,81 @@ class Reader:
         return connection.topic, bytes(raw), logged
 
 
+class Writer:
+    """As rosbag2_py.SequentialWriter."""
+
+    def open(self, storage: Any, converter: Any) -> None:  # noqa: A003
+        """Make a folder."""
+        from rosbags import rosbag2
+        from rosbags.typesys import get_typestore, Stores
+        assert (converter, storage.storage_preset_profile) == (
+            ('cdr', 'cdr'), 'zstd_fast' if storage.storage_id == 'mcap' else '')
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._writer = rosbag2.Writer(storage.uri, version=9, storage_plugin=(
+            rosbag2.StoragePlugin[storage.storage_id.upper()]))
+        self._writer.open()
+        self._topics: dict[str, Any] = {}
+
+    def create_topic(self, topic: Any) -> None:
+        """Take a rosbag2_py.TopicMetadata."""
+        assert (topic.id, topic.serialization_format) == (len(self._topics), 'cdr')
+        self._topics[topic.name] = self._writer.add_connection(
+            topic.name, topic.type, typestore=self._store)
+
+    def write(self, name: str, raw: bytes, stamp: int) -> None:
+        """Append a message."""
+        assert type(raw) is bytes
+        self._writer.write(self._topics[name], stamp, raw)
+
+    def close(self) -> None:
+        """Complete the bag."""
+        self._writer.close()
+
+
+def _store() -> Any:
+    from rosbags.typesys import get_typestore, Stores
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+class Kind(str):
+    """A message class by its name, as ROS makes them: by the names of its fields."""
+
+    def get_fields_and_field_types(self) -> dict[str, str]:
+        """Return its fields in order, without constants."""
+        return dict.fromkeys((name for name, _ in _store().fielddefs[self][1]), '')
+
+    def __call__(self, **values: Any) -> Any:
+        """Make one; sequences of numbers are lists."""
+        assert not any(isinstance(value, np.ndarray) for value in values.values())
+        return _store().types[self](**{name: np.array(value) if isinstance(value, list) and all(
+            isinstance(one, float) for one in value) else value
+            for name, value in values.items()})
+
+
 @pytest.fixture
 def by_ros(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have rosbags missing and ROS there."""
-    from rosbags.typesys import get_typestore, Stores
-    store = get_typestore(Stores.ROS2_JAZZY)
-    modules = {name: ModuleType(name) for name in (
-        'rosbag2_py', 'rosidl_runtime_py', 'rosidl_runtime_py.utilities', 'rclpy',
-        'rclpy.serialization')}
+    store = _store()
+    names = ['rosbag2_py']
+    if find_spec('rclpy') is None:
+        names += ['rosidl_runtime_py', 'rosidl_runtime_py.utilities', 'rclpy',
+                  'rclpy.serialization']
+    modules = {name: ModuleType(name) for name in names}
     modules['rosbag2_py'].__dict__.update(
-        SequentialReader=Reader, ConverterOptions=lambda one, other: (one, other),
-        StorageOptions=lambda uri, storage_id: SimpleNamespace(uri=uri, storage_id=storage_id),
+        SequentialReader=Reader, SequentialWriter=Writer, TopicMetadata=SimpleNamespace,
+        ConverterOptions=lambda one, other: (one, other),
+        StorageOptions=lambda **values: SimpleNamespace(**values),
         StorageFilter=lambda topics: SimpleNamespace(topics=topics))
-    modules['rosidl_runtime_py.utilities'].__dict__['get_message'] = lambda kind: kind
-    modules['rclpy.serialization'].__dict__['deserialize_message'] = store.deserialize_cdr
+    if len(names) > 1:
+        modules['rosidl_runtime_py.utilities'].__dict__['get_message'] = Kind
+        modules['rclpy.serialization'].__dict__.update(
+            deserialize_message=store.deserialize_cdr,
+            serialize_message=lambda message: store.serialize_cdr(message, message.__msgtype__))
     for name, module in modules.items():
         monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.setattr(bags, 'find_spec', lambda name: None)
-    monkeypatch.setattr(bags, 'available', lambda: True)
+    for module in (bags, writer):
+        monkeypatch.setattr(module, 'find_spec', lambda name: None)
+        monkeypatch.setattr(module, 'available', lambda: True)
 
 
 def streams() -> dict[str, TimeSeries]:
@@ -102,6 +161,27 @@ def test_both_readers_read_the_same(
     found = read_recording(path)
     assert (found.topics, found.notes) == (wanted.topics, wanted.notes)
     assert list(found.streams) == list(wanted.streams)
+    for name, series in wanted.streams.items():
+        np.testing.assert_array_equal(found.streams[name].times, series.times)
+        np.testing.assert_array_equal(found.streams[name].values, series.values)
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_both_writers_write_the_same(
+        request: pytest.FixtureRequest, tmp_path: Path, storage: str) -> None:
+    """Without rosbags, which no rosdep key has, simulate and import wrote no bag at all."""
+    drive = streams()
+    times = drive['wheels'].times
+    drive |= {'voltage': TimeSeries(times, np.full((times.size, 1), 24.5), ('bus',)),
+              'currents': TimeSeries(times, np.column_stack([times, -times]), ('left', 'right')),
+              'wheel_angles': drive['wheels'], 'wheel_torques': drive['wheels']}
+    wanted = read_recording(write_recording(tmp_path / 'one', drive, storage=storage))
+    request.getfixturevalue('by_ros')
+    other = write_recording(tmp_path / 'other', drive, storage=storage)
+    request.getfixturevalue('monkeypatch').undo()
+    found = read_recording(other)
+    assert found.topics == wanted.topics
+    assert set(found.streams) == set(wanted.streams) >= set(drive) - {'wheel_torques'}
     for name, series in wanted.streams.items():
         np.testing.assert_array_equal(found.streams[name].times, series.times)
         np.testing.assert_array_equal(found.streams[name].values, series.values)
