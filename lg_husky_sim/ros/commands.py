@@ -19,6 +19,9 @@ from lg_husky_sim.ros.tool import Tool
 #: Zero commands that end everything, and the time between two of them [s].
 ZEROS = 5
 SPACING = 0.02
+#: How long to wait for the names of the nodes that listen [s]; the middleware tells them after it
+#: has told that there is a listener. Until then nobody knows whether it is a recorder.
+NAMES = 3.0
 #: What a tool says to its user.
 Say = Callable[[str], object]
 
@@ -72,6 +75,17 @@ class Commands:
         return self._publisher.get_subscription_count() > 0 and any(
             end.kind == self.kind for end in self.robots())
 
+    def settle(self) -> None:
+        """Wait until the nodes that listen are known by name, for some seconds at most."""
+        end = time.monotonic() + NAMES
+        while time.monotonic() < end and not all(one.is_named for one in self.robots()):
+            self._tool.serve()
+
+    def _heard_by_name(self) -> bool:
+        if self.heard():
+            self.settle()
+        return self.heard()
+
     def wait(self, seconds: float, say: Say) -> None:
         """
         Wait until somebody listens, and say who.
@@ -83,7 +97,7 @@ class Commands:
 
         """
         end = time.monotonic() + seconds
-        while not self.heard():
+        while not self._heard_by_name():
             self._tool.serve()
             if time.monotonic() > end:
                 raise CommandError(self._silence(seconds))

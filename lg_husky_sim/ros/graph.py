@@ -40,6 +40,11 @@ class Endpoint:
     latched: bool
 
     @property
+    def is_named(self) -> bool:
+        """Whether it is known which node owns it; the graph may tell that a little later."""
+        return 'UNKNOWN' not in self.node
+
+    @property
     def is_tool(self) -> bool:
         """Whether one of our own live tools owns it."""
         return self.node.rpartition('/')[2] in TOOLS

@@ -69,7 +69,7 @@ class Neighbours:
         for topic in self._topics:
             # An end whose node is not known yet is looked at again later.
             others = [end.node for end in publishers(self._node, topic)
-                      if 'UNKNOWN' not in end.node]
+                      if end.is_named]
             if own in others:
                 others.remove(own)
             for other in others:

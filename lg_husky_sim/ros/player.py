@@ -105,6 +105,7 @@ def play(tool: Tool, streams: Mapping[str, TimeSeries], settings: Settings, *,
             tool.serve()
             if time.monotonic() > end:
                 raise RecordingError(f'nobody listens to any of the topics after {wait:g} s')
+        commands.settle()
         _say_who(commands, senders, told, say)
         tool.wait_for_time(wait)
         times = np.concatenate([streams[name].times for name in names])
