@@ -18,7 +18,7 @@ ROBOT: Final = (
     'wheel_inertia', 'dry_left', 'dry_right', 'viscous_left', 'viscous_right',
     'grip_along', 'grip_across', 'creep_speed', 'creep_share', 'rolling', 'yaw_damping',
     'mass', 'yaw_inertia', 'com_x', 'com_y', 'com_height', 'radius_left', 'radius_right',
-    'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak')
+    'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak', 'reference_lag')
 #: Numbers that are not estimated, read behind them.
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
                 'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate')
@@ -58,9 +58,10 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     mass, turning, xc, yc, height = p[22], p[23], p[24], p[25], p[26]
     slope_x, slope_y, track = p[29], p[30], p[31]
     build = step / p[32]
-    wheelbase, resistance, emf, radius = p[34], p[35], p[36], p[37]
-    load_time, dry_speed, rolling_speed, gravity, rest_rate = p[38], p[39], p[40], p[41], p[42]
+    wheelbase, resistance, emf, radius = p[35], p[36], p[37], p[38]
+    load_time, dry_speed, rolling_speed, gravity, rest_rate = p[39], p[40], p[41], p[42], p[43]
     kept = np.exp(-p[33] * step)
+    follow = 1.0 - np.exp(-step / p[34])
     half, side = 0.5 * wheelbase, 0.5 * track
     radii = (p[27], p[28])
     dry = (p[12], p[13])
@@ -69,11 +70,14 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     v, u, r = start[0] - start[2] * yc, start[1] + start[2] * xc, start[2]
     w = np.array([start[3], start[4]])
     held = np.zeros(2)
+    # An integral slower than a second is not built up yet.
+    built = ki / (ki + kff)
     for s in range(2):
         e = dry[s] * w[s] / np.sqrt(w[s] * w[s] + dry_speed * dry_speed) + viscous[s] * w[s]
-        held[s] = e / volt_per_amp + (emf - kff) * w[s]
+        held[s] = built * (e / volt_per_amp + (emf - kff) * w[s])
     ref_v = 0.5 * radius * (w[0] + w[1]) / speed_gain
     ref_w = radius * (w[1] - w[0]) / turn_width
+    slow_v, slow_w = ref_v, ref_w
     acc_x, acc_y = 0.0, 0.0
     keep = step / (step + load_time)
     a = np.zeros(2)
@@ -96,6 +100,8 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
         want_w = min(max(command[k, 1], -limit_w), limit_w)
         ref_v += min(max(want_v - ref_v, -slew_v * step), slew_v * step)
         ref_w += min(max(want_w - ref_w, -slew_w * step), slew_w * step)
+        slow_v += follow * (ref_v - slow_v)
+        slow_w += follow * (ref_w - slow_w)
         gx = -(slope_x * level[k, 0] + slope_y * level[k, 1])
         gy = -(-slope_x * level[k, 1] + slope_y * level[k, 0])
         front = 0.5 * (1.0 + (xc - height * acc_x / gravity) / half)
@@ -142,7 +148,8 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
                 b0 += push
                 b2 -= push * y
                 continue
-            wanted = (speed_gain * ref_v + (-0.5 if s == 0 else 0.5) * turn_width * ref_w) / radius
+            turning_part = (-0.5 if s == 0 else 0.5) * turn_width * slow_w
+            wanted = (speed_gain * slow_v + turning_part) / radius
             error = wanted - w[s]
             volts = kff * wanted + kp * error + held[s]
             loss = viscous[s] + dry[s] / np.sqrt(w[s] * w[s] + dry_speed * dry_speed)

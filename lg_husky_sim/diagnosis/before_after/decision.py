@@ -60,19 +60,25 @@ def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], whole: Sequen
     Candidate or None
     """
     first = _settled(body, whole, numbers)
-    other = _simplest([one for one in loop if one.gain > one.change.bar], numbers)
-    if first is not None and first.gain > numbers['body_claim'] and (
-            other is None or other.gain < numbers['loop_share'] * first.gain):
-        return first
-    options = [one for one in (first, other) if one is not None and one.gain > numbers['claim']]
+    other = _simplest(loop, numbers)
+    options = [one for one in (first, other) if one is not None and is_claimed(one, numbers)]
+    if len(options) == 2:
+        as_well = max((one.gain for one in whole if one.change is options[0].change), default=0.0)
+        if options[1].gain < max(numbers['loop_share'] * options[0].gain, as_well):
+            return options[0]
     return max(options, key=lambda one: one.gain, default=None)
+
+
+def is_claimed(one: Candidate, numbers: Mapping[str, float]) -> bool:
+    """Return whether a change is beyond what chance gives at the false-alarm rate."""
+    return one.gain > 0.0 and one.chance < numbers['false_alarm_rate']
 
 
 def _settled(body: Sequence[Candidate], whole: Sequence[Candidate], numbers: Mapping[str, float]
              ) -> Candidate | None:
     # Names that gain as much in the body's motion, by what they gain in all channels.
     near = [one for one in body if body[0].gain - one.gain < numbers['tie']
-            and one.gain > numbers['claim']]
+            and is_claimed(one, numbers)]
     if len(near) < 2:
         return _simplest(body, numbers)
     changes = [one.change for one in near]
@@ -87,7 +93,7 @@ def _simplest(candidates: Sequence[Candidate], numbers: Mapping[str, float]) -> 
         return None
     best = candidates[0]
     equal = [one for one in candidates if best.gain - one.gain < numbers['smaller']
-             and one.gain > numbers['claim']
+             and is_claimed(one, numbers)
              and set(one.change.parameters) < set(best.change.parameters)]
     return min(equal, key=lambda one: len(one.change.parameters), default=best)
 
@@ -111,29 +117,40 @@ def decide(body: Block | None, loop: Block | None, settings: Settings) -> Decisi
     looped = () if loop is None else loop.candidates
     named = named_by(bodily, looped, () if loop is None else loop.others, numbers)
     everything = sorted((*bodily, *looped), key=lambda one: -one.gain)
-    anything = max((block.anything for block in (body, loop) if block is not None), default=0.0)
-    gained = 0.0 if named is None else named.gain
-    if anything > numbers['unknown'] and gained < numbers['unknown_share'] * anything:
-        odds = numbers['sure_offset'] + numbers['sure_gain'] * float(np.log(
-            anything / numbers['claim'])) + numbers['sure_margin'] * (1.0 - gained / anything)
-        return Decision(None, _best_of_names(everything, ''), (), _bounded(odds, numbers),
-                        anything)
+    blocks = [block for block in (body, loop) if block is not None]
+    surest = min(blocks, key=lambda block: block.chance if block.anything > 0.0 else 1.0)
+    gained = 0.0 if named is None else max(
+        one.gain for one in (named, *(() if loop is None else loop.others))
+        if one.change is named.change)
+    rate = numbers['false_alarm_rate']
+    if surest.anything > 0.0 and surest.chance < rate and (
+            gained < numbers['unknown_share'] * surest.anything):
+        margin = 1.0 - gained / surest.anything
+        return Decision(None, _best_of_names(everything, ''), (),
+                        _bounded(_odds(surest.chance, margin, numbers), numbers),
+                        surest.anything)
     if named is None:
-        largest = max((one.gain for one in everything), default=0.0)
-        doubt = numbers['sure_doubt'] * float(np.clip(largest / numbers['claim'], 0.0, 2.0))
+        least = min((one.chance for one in everything if one.gain > 0.0), default=1.0)
+        doubt = numbers['sure_doubt'] * min(float(np.log(max(least, 1e-300)) / np.log(rate)), 1.0)
         return Decision(None, _best_of_names(everything, ''), (),
                         _bounded(numbers['sure_nothing'] - doubt, numbers))
     same = [one for one in everything if one.change.block == named.change.block]
     rivals = _best_of_names(same, named.change.effect)
     second = max(rivals[0].gain, 0.0) if rivals else 0.0
     margin = float(np.clip(1.0 - second / named.gain, 0.0, 1.0))
-    odds = (numbers['sure_offset'] + numbers['sure_margin'] * margin
-            + numbers['sure_gain'] * float(np.log(named.gain / numbers['claim'])))
-    alike = [one.change.effect for one in rivals if one.gain > numbers['claim'] and (
+    odds = _odds(named.chance, margin, numbers)
+    alike = [one.change.effect for one in rivals if is_claimed(one, numbers) and (
         named.gain - one.gain < max(numbers['tie'], numbers['near'] * named.gain))]
     alike += settings.aliases.get(named.change.effect, ())
     tied = (named.change.effect, *dict.fromkeys(alike)) if alike else ()
     return Decision(named, rivals, tied, _bounded(odds, numbers))
+
+
+def _odds(chance: float, margin: float, numbers: Mapping[str, float]) -> float:
+    # Log odds of a claim.
+    beyond = float(np.log(numbers['false_alarm_rate'] / max(chance, 1e-300)))
+    return (numbers['sure_offset'] + numbers['sure_margin'] * margin
+            + numbers['sure_gain'] * beyond)
 
 
 def _best_of_names(candidates: Sequence[Candidate], but: str) -> tuple[Candidate, ...]:

@@ -24,7 +24,6 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from scipy.stats import chi2
 
 #: Told what is being done and how far it is (0 to 1).
 Progress = Callable[[str, float], None]
@@ -93,7 +92,8 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
     with threads(jobs) as pool:
         intervals = [float(np.median(np.diff(d.wheels.times))) for d in (*before, *after)
                      if d.wheels.times.size > 1]
-        base = base_of(known, nominal.parameters, True, max(intervals, default=0.0))
+        streams = frozenset.intersection(*(frozenset(d.bins) for d in (*before, *after)))
+        base = base_of(known, nominal.parameters, True, max(intervals, default=0.0), streams)
         begin = base.start
         if all(_shows_the_body(drive) for drive in (*before, *after)):
             body = compare(base, before, after, begin, pool, lambda share: progress(
@@ -131,7 +131,7 @@ def _diagnosis(decision: Decision, body: Block | None, loop: Block, after: Seque
                earlier: Sequence[Segment], later: Sequence[Segment], nominal: ModelFile,
                known: Settings, progress: Progress, notes: Sequence[str]) -> Diagnosis:
     named = decision.named
-    found = finding(decision, known, _p_value(decision, known),
+    found = finding(decision, known, math.nan if named is None else named.chance,
                     _share(decision, body, loop, after))
     about = 'robot before the change, by lg_husky diagnose'
     steps = int(known.fit['evaluations'])
@@ -161,15 +161,6 @@ def _diagnosis(decision: Decision, body: Block | None, loop: Block, after: Seque
 
 def _errors(model: ModelFile, parts: Sequence[Segment]) -> dict[str, float]:
     return errors(compile_model(model.structure).at(model.parameters), parts)
-
-
-def _p_value(decision: Decision, known: Settings) -> float:
-    # Of twice the gain as a drop of chi-square, for as many hypotheses as were tried.
-    if decision.named is None:
-        return math.nan
-    count = len(known.changes)
-    freedom = len(decision.named.parameters)
-    return float(min(1.0, count * chi2.sf(2.0 * decision.named.gain, freedom)))
 
 
 def _share(decision: Decision, body: Block | None, loop: Block, after: Sequence[Drive]

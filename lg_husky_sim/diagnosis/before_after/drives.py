@@ -68,6 +68,8 @@ class Drive:
         Speeds at the start: forward, lateral, yaw, wheels.
     bins : mapping of str to Bins
         By stream: wheels, imu, pose.
+    gyro : numpy.ndarray, shape (n, 2)
+        Stamps [s] and the integral of the yaw rate to each [rad]; none without an IMU.
     """
 
     recording: str
@@ -80,6 +82,7 @@ class Drive:
     wheels: TimeSeries
     begin: FloatArray
     bins: Mapping[str, Bins]
+    gyro: FloatArray
 
 
 def _binned(times: FloatArray, values: FloatArray, start: float, width: float) -> Bins:
@@ -141,6 +144,7 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
         bins[stream] = _binned(streams[stream].times[later], values[later], start, widths[kind])
 
     begin = np.zeros(5)
+    gyro = np.zeros((0, 2))
     wheels = TimeSeries(np.zeros(0), np.zeros((0, 2)), CHANNELS['wheels'])
     if 'wheels' in streams:
         wheels = streams['wheels']
@@ -149,6 +153,9 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
     if 'imu' in streams:
         binned('imu', streams['imu'].values, 'yaw')
         begin[2] = float(np.median(streams['imu'].values[:5, 0]))
+        stamps, rate = streams['imu'].times, streams['imu'].values[:, 0]
+        gyro = np.column_stack([stamps, np.concatenate([[0.0], np.cumsum(
+            0.5 * np.diff(stamps) * (rate[1:] + rate[:-1]))])])
     if 'pose' in streams:
         pose = streams['pose']
         heading = np.unwrap(pose.values[:, 2])
@@ -156,7 +163,7 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
         at = np.interp(middle, pose.times, heading)
         level = np.column_stack([np.cos(at), np.sin(at)])
     return Drive(name, start, steps, command.times, total, command.values[-1], level, wheels,
-                 begin, bins)
+                 begin, bins, gyro)
 
 
 def mean_command(drive: Drive, step: float, delay: float) -> FloatArray:

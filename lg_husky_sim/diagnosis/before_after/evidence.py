@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 @dataclass(frozen=True, eq=False)
 class Quadratic:
     """
-    A recording's log likelihood near its set's fit, as 0.5 θ'Hθ - h'θ.
+    A recording's negative log likelihood near a point, as 0.5 θ'Hθ - h'θ + c.
 
     Parameters
     ----------
@@ -23,12 +23,24 @@ class Quadratic:
     after : bool
     curvature : numpy.ndarray, shape (n, n)
     slope : numpy.ndarray, shape (n,)
+    cost : float
+        The constant c [nats].
     """
 
     recording: str
     after: bool
     curvature: FloatArray
     slope: FloatArray
+    cost: float = 0.0
+
+    def value(self, at: FloatArray) -> float:
+        """Return the negative log likelihood at parameters [nats]."""
+        return float(0.5 * at @ self.curvature @ at - self.slope @ at + self.cost)
+
+    def among(self, index: NDArray[np.intp]) -> Quadratic:
+        """Return this for some of the parameters; it does not depend on the others."""
+        return replace(self, curvature=self.curvature[np.ix_(index, index)],
+                       slope=self.slope[index])
 
     def varying(self, sd: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Return curvature, slope and log evidence with the recording's own deviation."""
@@ -39,7 +51,8 @@ class Quadratic:
         curvature = self.curvature - self.curvature @ left[:, :-1]
         slope = self.slope - self.curvature @ left[:, -1]
         sign_log = np.linalg.slogdet(inner)[1]
-        return curvature, slope, float(0.5 * self.slope @ left[:, -1] - 0.5 * sign_log)
+        return curvature, slope, float(
+            0.5 * self.slope @ left[:, -1] - 0.5 * sign_log - self.cost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +99,114 @@ class Evidence:
     recording_sd: FloatArray
     change_sd: FloatArray
 
+    def estimated(self, weight: float, rounds: int) -> Evidence:
+        """
+        Return this with deviations from recording to recording as these data have them.
+
+        By expectation and maximisation with both sets free, so that a change is none of them::
+
+            sd^2 = (weight sd_assumed^2 + sum of E[deviation^2]) / (weight + n_recordings)
+
+        Parameters
+        ----------
+        weight : float
+            Recordings that the assumed deviations are worth.
+        rounds : int
+            Of the iteration.
+
+        Returns
+        -------
+        Evidence
+        """
+        n = self.mean.size
+        found = self
+        for _ in range(rounds):
+            at, covariance, _ = found._posterior(np.arange(n))
+            sd = found.recording_sd
+            squares = np.zeros(n)
+            for one in self.quadratics:
+                level = np.hstack([np.eye(n), np.eye(n) if one.after else np.zeros((n, n))])
+                left = sd[:, None] * one.curvature
+                inner = left * sd
+                inner[np.diag_indices(n)] += 1.0
+                spread = np.linalg.inv(inner)
+                move = spread @ left @ level
+                deviation = spread @ (sd * one.slope) - move @ at
+                squares += deviation ** 2 + np.diag(spread) + np.einsum(
+                    'ij,jk,ik->i', move, covariance, move)
+            found = replace(self, recording_sd=np.sqrt(
+                (weight * self.recording_sd ** 2 + sd ** 2 * squares)
+                / (weight + len(self.quadratics))))
+        return found
+
+    def modes(self, changed: NDArray[np.intp]) -> tuple[FloatArray, list[FloatArray]]:
+        """Return what is shared and differs, and each recording's likeliest parameters."""
+        at, _, _ = self._posterior(changed)
+        sd = self.recording_sd
+        found = []
+        for one in self.quadratics:
+            mean = self.level(at, changed, one.after)
+            inner = sd[:, None] * one.curvature * sd
+            inner[np.diag_indices(sd.size)] += 1.0
+            found.append(mean + sd * np.linalg.solve(
+                inner, sd * (one.slope - one.curvature @ mean)))
+        return at, found
+
+    def evidence_at(self, changed: NDArray[np.intp], at: FloatArray,
+                    places: Sequence[FloatArray]) -> float:
+        """
+        Return the log evidence about a point instead of the mode: what is sure of it.
+
+        Parameters
+        ----------
+        changed : numpy.ndarray of int
+            Which parameters differ after.
+        at : numpy.ndarray, shape (n + k,)
+            What is shared, and what differs.
+        places : sequence of numpy.ndarray
+            Parameters of each recording.
+
+        Returns
+        -------
+        float
+            [nats]
+        """
+        mode, own = self.modes(changed)
+        return (self.solve(changed).evidence + self._energy(changed, mode, own)
+                - self._energy(changed, at, places))
+
+    def level(self, at: FloatArray, changed: NDArray[np.intp], after: bool) -> FloatArray:
+        """Return the parameters of a set without its recordings' deviations."""
+        found = np.array(at[:self.mean.size])
+        if after:
+            found[changed] += at[self.mean.size:]
+        return found
+
+    def strain(self, changed: NDArray[np.intp], at: FloatArray, places: Sequence[FloatArray]
+               ) -> float:
+        """Return the negative log priors of a point, up to a constant [nats]."""
+        n = self.mean.size
+        total = 0.5 * float(np.sum(((at[:n] - self.mean) / self.sd) ** 2)
+                            + np.sum((at[n:] / self.change_sd[changed]) ** 2))
+        free = self.recording_sd > 0.0
+        for one, place in zip(self.quadratics, places, strict=True):
+            apart = (place - self.level(at, changed, one.after))[free] / self.recording_sd[free]
+            total += 0.5 * float(apart @ apart)
+        return total
+
+    def _energy(self, changed: NDArray[np.intp], at: FloatArray, places: Sequence[FloatArray]
+                ) -> float:
+        return self.strain(changed, at, places) + sum(
+            one.value(place) for one, place in zip(self.quadratics, places, strict=True))
+
     def solve(self, changed: NDArray[np.intp]) -> Solution:
         """Return the solution where the parameters of these indices differ after."""
+        n = self.mean.size
+        at, covariance, evidence = self._posterior(changed)
+        return Solution(evidence, at[:n], at[n:], np.asarray(covariance[n:, n:], dtype=np.float64))
+
+    def _posterior(self, changed: NDArray[np.intp]) -> tuple[FloatArray, FloatArray, float]:
+        # Mean and covariance of what is shared and of what differs, and the log evidence.
         n, k = self.mean.size, changed.size
         precision = np.zeros((n + k, n + k))
         slope = np.zeros(n + k)
@@ -110,4 +229,4 @@ class Evidence:
         covariance = np.linalg.inv(precision)
         at = covariance @ slope
         evidence = prior + 0.5 * float(slope @ at) - 0.5 * float(np.linalg.slogdet(precision)[1])
-        return Solution(evidence, at[:n], at[n:], np.asarray(covariance[n:, n:], dtype=np.float64))
+        return at, np.asarray(covariance, dtype=np.float64), evidence

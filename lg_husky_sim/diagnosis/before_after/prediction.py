@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.before_after.base_robot import FIXED, ROBOT, simulate
@@ -36,6 +36,8 @@ class Base:
         Means and standard deviations of the priors, on the scale of the estimates.
     fixed : numpy.ndarray
         Numbers that are not estimated.
+    reference : int
+        Index of the delay of the stream against which those of the others are.
     given : bool
         Whether the wheels turn as measured, which leaves the body's motion to be explained.
     """
@@ -44,6 +46,7 @@ class Base:
     start: FloatArray
     sd: FloatArray
     fixed: FloatArray
+    reference: int
     given: bool = False
 
     @property
@@ -56,6 +59,11 @@ class Base:
         logs = np.array([q.logarithmic for q in self.settings.quantities])
         return np.where(logs, np.exp(np.where(logs, z, 0.0)), z)
 
+    def place(self, name: str, value: float) -> float:
+        """Return a parameter on the scale of the estimates."""
+        quantity = self.settings.quantities[self.names.index(name)]
+        return float(np.log(value)) if quantity.logarithmic else value
+
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the bounds on the scale of the estimates."""
         def scaled(q: Quantity, value: float) -> float:
@@ -66,20 +74,41 @@ class Base:
 
 
 def base_of(settings: Settings, nominal: Parameters, given: bool = False,
-            interval: float = 0.0) -> Base:
-    """Return the base for the model in doubt; `interval` is that of the wheel rates [s]."""
+            interval: float = 0.0, streams: Collection[str] = CHANNELS) -> Base:
+    """
+    Return the base for the model in doubt.
+
+    Parameters
+    ----------
+    settings : Settings
+    nominal : Parameters
+    given : bool
+        Whether the wheels turn as measured.
+    interval : float
+        Of the wheel rates [s].
+    streams : collection of str
+        That every drive has: delays are against the pose, or else the IMU, or else the wheels.
+
+    Returns
+    -------
+    Base
+    """
     start = [nominal[q.nominal] if q.start is None else q.start for q in settings.quantities]
     logs = [q.logarithmic for q in settings.quantities]
     z = np.array([np.log(x) if log else x for x, log in zip(start, logs, strict=True)])
-    late = [q.name for q in settings.quantities].index('wheels_late')
+    names = [q.name for q in settings.quantities]
+    late = names.index('wheels_late')
     z[late] += 0.5 * interval
     sd = np.array([q.sd for q in settings.quantities])
     sd[late] += 0.5 * interval
+    reference = next((one for one in ('pose', 'imu', 'wheels') if one in streams), 'pose')
+    against = names.index(f'{reference}_late')
+    sd[against] = settings.fit['reference']
     numbers = {**settings.simulation,
                'wheelbase': nominal['wheelbase'], 'wheel_radius': nominal['wheel_radius'],
                'motor_resistance': nominal['motor_resistance'],
                'transmission': nominal['torque_constant'] * nominal['gear_ratio']}
-    return Base(settings, z, sd, np.array([numbers[name] for name in FIXED]), given)
+    return Base(settings, z, sd, np.array([numbers[name] for name in FIXED]), against, given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +193,19 @@ def predicted(base: Base, drive: Drive, x: FloatArray, motion: Motion) -> dict[s
         bins = drive.bins['pose']
         path = bins.mean(_at(bins.times - value['pose_late'], drive.start, step, motion.path))
         found['pose'] = movements(bins, path)
+        if drive.gyro.size:
+            found['pose'][:, 2] = _turn_by_gyro(drive, bins, value)
     return found
+
+
+def _turn_by_gyro(drive: Drive, bins: Bins, value: Mapping[str, float]) -> FloatArray:
+    # A relation of two sensors, linear in the gyro's factor and offset: what the gyro has turned
+    # is to be the factor times what the pose has. No error of the robot's model can enter.
+    times = bins.times - value['pose_late'] + value['imu_late']
+    turned = np.diff(bins.mean(np.interp(times, drive.gyro[:, 0], drive.gyro[:, 1])))
+    pose = np.diff(bins.values[:, 2])
+    less = turned - value['gyro_factor'] * pose - value['gyro_bias'] * np.diff(bins.mean(times))
+    return np.asarray(pose - less)
 
 
 def measured(base: Base, drive: Drive) -> dict[str, FloatArray]:

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 #: What a base adds to the graph's command path, drivetrains and tyres.
-ADDED = (Effect('command_latency'), Effect('command_slew', shape='both'), Effect('speed_loop'),
+ADDED = (Effect('command_latency'), Effect('command_slew', shape='both'),
          Effect('traction_saturation', shape='circle'))
 #: What is fitted after the numbers of the base are put in, all positive.
 FITTED = ('wheel_damping', 'yaw_damping', 'traction_torque', 'command_gain', 'turn_ratio',
@@ -48,19 +48,22 @@ def started(nominal: ModelFile, base: Mapping[str, float], settings: Settings) -
     transmission = parameters['torque_constant'] * parameters['gear_ratio']
     radius = 0.5 * (base['radius_left'] + base['radius_right'])
     load = base['mass'] * settings.simulation['gravity'] / 4.0
+    loop = base['loop_gain'] + base['loop_integral'] * settings.fit['settle'] > (
+        settings.fit['loop_shows'] * base['loop_feedforward'])
+    volts = transmission if loop else base['loop_feedforward']
     values = {
         'latency': base['dead_time'], 'slew_forward': base['slew_forward'],
-        'slew_yaw': base['slew_yaw'], 'loop_lag': settings.fit['loop_lag'],
+        'slew_yaw': base['slew_yaw'], 'loop_lag': base['reference_lag'],
         'loop_gain': base['loop_gain'], 'loop_integral': base['loop_integral'],
         'traction_torque': base['grip_along'] * load * radius,
         'wheel_radius': radius, 'mass': base['mass'], 'yaw_inertia': base['yaw_inertia'],
         'wheel_inertia': base['wheel_inertia'],
-        'command_gain': base['speed_gain'] * transmission / (
+        'command_gain': base['speed_gain'] * volts / (
             parameters['supply_voltage'] * parameters['wheel_radius']),
         'turn_ratio': 0.5 * base['turn_width'] / base['speed_gain'],
         'wheel_damping': settings.fit['slip_damping'] * parameters['wheel_damping'],
         'yaw_damping': settings.fit['slip_damping'] * parameters['yaw_damping']}
-    effects = list(ADDED)
+    effects = [*ADDED, *([Effect('speed_loop')] if loop else [])]
     dry, radii = (tuple(base[f'{name}_{side}'] for side in ('left', 'right'))
                   for name in ('dry', 'radius'))
     if abs(dry[0] - dry[1]) > settings.fit['one_sided'] * sum(dry):

@@ -64,8 +64,6 @@ class Change:
         body or loop: where it shows.
     parameters : tuple of str
         Names of those that differ.
-    bar : float
-        Least gain that claims it [nats].
     more : tuple of str
         Of those that differ as well, and show in the loop only.
     title, regime : str
@@ -79,7 +77,6 @@ class Change:
     subsystem: str
     block: str
     parameters: tuple[str, ...]
-    bar: float
     more: tuple[str, ...]
     title: str
     regime: str
@@ -117,6 +114,7 @@ class Settings:
     body: frozenset[str]
     limits: frozenset[str]
     starts: tuple[Mapping[str, float], ...]
+    kinds: tuple[Mapping[str, float], ...]
     fit: Mapping[str, float]
     decision: Mapping[str, float]
     changes: tuple[Change, ...]
@@ -157,9 +155,8 @@ def _change(entry: Mapping[str, Any], known: frozenset[str]) -> Change:
         raise DiagnosisError(f'before_after.yaml: change {entry["effect"]}: block = '
                              f'{shown(entry["block"])} is neither body nor loop')
     return Change(entry['effect'], entry['side'], entry['subsystem'], entry['block'],
-                  tuple(entry['parameters']), _number('bar', entry.get('bar', 0.0)),
-                  tuple(entry.get('more', ())), entry['title'], entry['regime'],
-                  tuple(entry['elements']))
+                  tuple(entry['parameters']), tuple(entry.get('more', ())), entry['title'],
+                  entry['regime'], tuple(entry['elements']))
 
 
 def _values(content: Mapping[str, Any], section: str) -> dict[str, float]:
@@ -194,14 +191,15 @@ def settings() -> Settings:
         noise = {name: _number(f'{name}.noise', entry['noise']) for name, entry in channels}
         known = frozenset((*robot, *(q.name for q in record)))
         groups = {key: frozenset(content[key]) for key in ('body', 'limits')}
-        starts = tuple({name: _number(f'starts.{name}', value) for name, value in entry.items()}
-                       for entry in content['starts'])
-        for name in sorted({*groups['body'], *groups['limits'], *(n for s in starts for n in s)}
-                           - known):
+        starts, kinds = (tuple({name: _number(f'{section}.{name}', value)
+                                for name, value in entry.items()} for entry in content[section])
+                         for section in ('starts', 'kinds'))
+        for name in sorted({*groups['body'], *groups['limits'],
+                            *(name for entry in (*starts, *kinds) for name in entry)} - known):
             raise DiagnosisError(f'{path}: unknown parameter {shown(name)}')
         return Settings(tuple(robot[name] for name in ROBOT), record,
                         _values(content, 'simulation'), bins, noise, groups['body'],
-                        groups['limits'], starts, _values(content, 'fit'),
+                        groups['limits'], starts, kinds, _values(content, 'fit'),
                         _values(content, 'decision'),
                         tuple(_change(entry, known) for entry in content['changes']),
                         {name: tuple(others) for name, others in content['aliases'].items()},

@@ -10,11 +10,12 @@ from pathlib import Path
 
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
 from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT, simulate
-from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
+from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate, chance_of
 from lg_husky_sim.diagnosis.before_after.conclusion import finding
 from lg_husky_sim.diagnosis.before_after.decision import decide
 from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, ChangeCase
 from lg_husky_sim.diagnosis.before_after.drives import drives, mean_command
+from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.prediction import base_of
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
@@ -126,7 +127,52 @@ def test_a_change_is_named_with_its_number(changes: Mapping[str, float], effect:
     number = next(one for one in finding.parameters if one.name == parameter)
     assert number.low < number.value < number.high
     assert number.value == pytest.approx(changes[parameter], rel=0.3, abs=0.01)
-    assert finding.held_out_gain > settings().decision['claim']
+    assert finding.p_value < settings().decision['false_alarm_rate']
+
+
+VOLTAGES = {'slew_forward': 50.0, 'slew_yaw': 100.0, 'limit_forward': 20.0, 'limit_yaw': 20.0,
+            'loop_feedforward': 3.5, 'loop_gain': 0.001, 'loop_integral': 0.001,
+            'turn_width': 1.08, 'yaw_damping': 10.0, 'current_limit': 500.0}
+
+
+def test_a_robot_without_a_speed_loop_is_compared_as_well() -> None:
+    """It is driven by voltages, as the paper's; a change of its friction has its name."""
+    before = [driven('base1', VOLTAGES, 1), driven('base2', VOLTAGES, 2, OTHER)]
+    same = [driven('rec1', VOLTAGES, 3, OTHER), driven('rec2', VOLTAGES, 4)]
+    assert change_case(same, before, load_model(), silent, jobs=2).diagnosis.findings == ()
+    worn = {**VOLTAGES, 'dry_left': 6.5}
+    case = change_case([driven('rec1', worn, 3, OTHER), driven('rec2', worn, 4)], before,
+                       load_model(), silent, jobs=2)
+    assert [(f.effect, f.side) for f in case.diagnosis.findings] == [
+        ('coulomb_drivetrain', 'left')]
+    assert 'speed_loop' not in {e.id for e in case.diagnosis.model.structure.effects}
+
+
+def test_a_gyro_is_judged_by_the_pose_and_not_by_the_model() -> None:
+    """Its factor is found to half a percent though nothing says how the robot turns."""
+    case = changed({'grip_along': 0.45, 'grip_across': 0.36}, factor=0.93)
+    assert case.body is not None
+    after = dict(zip(case.body.base.names, case.body.base.values(case.body.after), strict=True))
+    assert after['gyro_factor'] == pytest.approx(0.93, abs=0.005)
+
+
+@pytest.mark.parametrize(('deviation', 'beyond'), [(0.05, False), (0.005, True)])
+def test_a_shift_is_judged_by_what_recordings_differ_by(deviation: float, beyond: bool) -> None:
+    """Three recordings a set that differ by as much as their means, or by a tenth of it."""
+    rng = np.random.default_rng(2)
+    places = rng.standard_normal(6)
+    places = deviation * (places - np.repeat([places[:3].mean(), places[3:].mean()], 3))
+    places[3:] += 0.05
+    precise = np.array([[1e8]])
+    recordings = [Quadratic(f'rec{k}', k > 2, precise, 1e8 * places[k:k + 1]) for k in range(6)]
+    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.001),
+                        np.full(1, 0.1)).estimated(2.0, 30)
+    solved = evidence.solve(np.array([0]))
+    assert solved.shift[0] == pytest.approx(0.05, rel=0.3)
+    assert evidence.recording_sd[0] == pytest.approx(
+        np.sqrt((2.0 * 0.001 ** 2 + np.sum((places - np.repeat(
+            [places[:3].mean(), places[3:].mean()], 3)) ** 2)) / 8.0), rel=0.3)
+    assert (30 * chance_of(solved, 6.0) < 0.02) is beyond
 
 
 @pytest.mark.parametrize(('how', 'effect'), [
@@ -143,16 +189,19 @@ def test_a_change_without_a_name_is_unknown() -> None:
     known = settings()
     base = base_of(known, load_model().parameters)
     z = base.start
-    named = Candidate(known.changes[3], known.changes[3].parameters, 20.0, z[:2], z[:2], z[:2])
-    block = Block(base, z, z, first_noise(known), (), (named,), 200.0)
-    decision = decide(None, replace(block, candidates=(named,), others=()), known)
+    named = Candidate(known.changes[3], known.changes[3].parameters, 20.0, z[:2], z[:2], z[:2],
+                      1e-4)
+    block = Block(base, z, z, first_noise(known), (named,), (), 200.0, 1e-6)
+    decision = decide(None, block, known)
     assert decision.named is None
     assert decision.unnamed == 200.0
     found = finding(decision, known, 1e-9, 0.5)
     assert found is not None
     assert (found.effect, found.rivals[0].effect) == ('unknown', named.change.effect)
-    assert decide(None, replace(block, candidates=(named,), others=(), anything=50.0),
-                  known).named is named
+    assert decide(None, replace(block, anything=50.0), known).named is named
+    assert decide(None, replace(block, chance=0.5), known).named is named
+    by_chance = replace(block, candidates=(replace(named, chance=0.1),), chance=0.5)
+    assert decide(None, by_chance, known).named is None
 
 
 def test_the_order_of_recordings_does_not_matter() -> None:
