@@ -14,7 +14,7 @@ from lg_husky_sim.diagnosis.evidence.unknowns import effect_unknowns, model_unkn
 from lg_husky_sim.diagnosis.output import headline
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
-from lg_husky_sim.diagnosis.sensors.relations import relations
+from lg_husky_sim.diagnosis.sensors.relations import by_names, relations
 from lg_husky_sim.diagnosis.sensors.robot import differences, impossible
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model_file import load_model
@@ -157,6 +157,23 @@ def test_a_payload_of_hundreds_of_kilograms_is_another_robot(name: str, value: f
     fit: Any = SimpleNamespace(point=SimpleNamespace(
         unknowns=unknowns, strain=strain, numbers=numbers))
     assert bool(impossible(fit, model.parameters)) is impossible_
+
+
+def test_wheels_known_by_noisy_angles_alone_are_compared_by_these(clean: Recording) -> None:
+    """Rates made of such angles are mostly noise, which would pass for smaller wheels."""
+    wheels = clean.streams['wheels']
+    rng = np.random.default_rng(5)
+    step = np.diff(wheels.times)[:, None]
+    turned = np.vstack([np.zeros((1, 2)), np.cumsum(
+        0.5 * step * (wheels.values[1:] + wheels.values[:-1]), axis=0)])
+    turned += 0.1 * rng.standard_normal(turned.shape)
+    middles = 0.5 * (wheels.times[:-1] + wheels.times[1:])
+    streams = {**clean.streams,
+               'wheel_angles': TimeSeries(wheels.times, turned, wheels.names),
+               'wheels': TimeSeries(middles, np.diff(turned, axis=0) / step, wheels.names)}
+    counted = replace(clean, streams=streams)
+    rolls = by_names(relations(segments(counted)))['speed', 'wheels', 'pose'].factor
+    assert rolls.value == pytest.approx(load_model().parameters['wheel_radius'], rel=0.02)
 
 
 def test_readings_that_are_no_numbers_are_left_out(clean: Recording) -> None:

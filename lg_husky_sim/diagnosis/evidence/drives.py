@@ -166,8 +166,9 @@ def _thinned(series: TimeSeries | None) -> TimeSeries | None:
     return TimeSeries(series.times[::stride], series.values[::stride], series.names)
 
 
-def _derived(rates: TimeSeries, angles: TimeSeries) -> bool:
-    # Rates that reading made of the angles, in the middle between their stamps: no measurement.
+def are_derived(rates: TimeSeries, angles: TimeSeries) -> bool:
+    """Return whether reading made the rates of the angles: they are no measurement then."""
+    # They are in the middle between the angles' stamps.
     middles = 0.5 * (angles.times[:-1] + angles.times[1:])
     return len(rates) > 3 and bool(np.mean(np.isin(rates.times, middles)) > 0.5)
 
@@ -213,7 +214,7 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
     wheels, imu, pose = (_thinned(streams.get(n)) for n in ('wheels', 'imu', 'pose'))
     angles = _thinned(streams.get('wheel_angles'))
     counted = angles is not None and (
-        wheels is None or _derived(streams['wheels'], streams['wheel_angles']))
+        wheels is None or are_derived(streams['wheels'], streams['wheel_angles']))
     turning = angles if counted else wheels
     pieces: list[tuple[Channel, FloatArray, FloatArray]] = []
     rates: tuple[float, float] | None = None

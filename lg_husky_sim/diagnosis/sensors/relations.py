@@ -17,8 +17,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from lg_husky_sim.diagnosis.evidence.drives import are_derived
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.recording import Segment
+from lg_husky_sim.recording.wheels import unwrapped
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
@@ -109,17 +111,25 @@ def _turned(part: Segment) -> Way | None:
     return None if imu is None else _integral(imu.times, imu.column('yaw_rate'))
 
 
+def _wheels(part: Segment) -> tuple[FloatArray, FloatArray] | None:
+    # Stamps and angles of both sides: counted ones where rates were only made of them.
+    rates, angles = part.streams.get('wheels'), part.streams.get('wheel_angles')
+    if angles is not None and len(angles) and (rates is None or are_derived(rates, angles)):
+        return angles.times, np.column_stack([
+            unwrapped(angles.column(side)) for side in ('left', 'right')])
+    return None if rates is None else (rates.times, np.column_stack([
+        _integral(rates.times, rates.column(side))[1] for side in ('left', 'right')]))
+
+
 def _apart(part: Segment) -> Way | None:
     # By how much the right wheels turn further than the left ones.
-    wheels = part.streams.get('wheels')
-    return None if wheels is None else _integral(
-        wheels.times, wheels.column('right') - wheels.column('left'))
+    wheels = _wheels(part)
+    return None if wheels is None else (wheels[0], wheels[1][:, 1] - wheels[1][:, 0])
 
 
 def _mean(part: Segment) -> Way | None:
-    wheels = part.streams.get('wheels')
-    return None if wheels is None else _integral(
-        wheels.times, 0.5 * (wheels.column('left') + wheels.column('right')))
+    wheels = _wheels(part)
+    return None if wheels is None else (wheels[0], wheels[1].mean(axis=1))
 
 
 #: What is compared: quantity, source, reference, and the integrals of both.
