@@ -97,6 +97,8 @@ class EffectParameter:
         where every size counts.
     shapes : tuple of str
         Forms that have it; empty for all.
+    linear : bool
+        Whether it is estimated on a linear scale though it has one sign only.
     """
 
     name: str
@@ -108,6 +110,7 @@ class EffectParameter:
     fixed: bool = False
     negligible: float = 0.0
     shapes: tuple[str, ...] = ()
+    linear: bool = False
 
     def parameter(self, value: float | None = None) -> Parameter:
         """Return it as a parameter with ``value``, or with its first start."""
@@ -155,6 +158,8 @@ class EffectKind:
         The drivetrain that has it; empty for any.
     needs : mapping of str to str
         Effect that a form only makes sense with, by the form.
+    stands_for : mapping of str to tuple of str
+        Forms without a number that it has not, which a diagnosis tries in a form's place.
     tried : bool
         Whether a diagnosis tries it.
     sensors, manoeuvres : tuple of str
@@ -173,6 +178,7 @@ class EffectKind:
     onset: str = ''
     drivetrain: str = ''
     needs: Mapping[str, str] = field(default_factory=dict)
+    stands_for: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     tried: bool = True
     sensors: tuple[str, ...] = ()
     manoeuvres: tuple[str, ...] = ()
@@ -280,14 +286,16 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
         EffectParameter(key, str(p['unit']), float(p['lower']), float(p['upper']),
                         tuple(float(s) for s in p['starts']), str(p['source']),
                         bool(p.get('fixed', False)), float(p.get('negligible', 0.0)),
-                        tuple(p.get('shapes', ())))
+                        tuple(p.get('shapes', ())), bool(p.get('linear', False)))
         for key, p in entry['parameters'].items())
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),
         parameters, tuple(entry.get('sides', ('none',))), tuple(entry.get('shapes', ('',))),
         str(entry.get('onset', '')), str(entry.get('drivetrain', '')),
-        dict(entry.get('needs', {})), bool(entry.get('tried', True)),
-        tuple(entry.get('sensors', ())), tuple(entry.get('manoeuvres', ())),
+        dict(entry.get('needs', {})),
+        {form: tuple(others) for form, others in entry.get('stands_for', {}).items()},
+        bool(entry.get('tried', True)), tuple(entry.get('sensors', ())),
+        tuple(entry.get('manoeuvres', ())),
         Remedy(*(tuple(entry.get('advice', {}).get(place, ())) for place in (
             'robot', 'simulator'))))
 

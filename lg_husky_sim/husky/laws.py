@@ -86,6 +86,8 @@ class Law(enum.IntEnum):
     """f = -(p0/p1) (held + p4 max(E^2 - (held/p1)^2, 0) z0), E = exp(-(z1/p3)^2), held' = z0
     within |held| <= p1 E: what rests is held by a damped spring that gives way by p1 and carries
     p0 at most, until z1 moves; p2 is 0 or 1 (left or right axle), 2 or 3 (tyres there)."""
+    YIELDING = 18
+    """f = sgn(z0) max(|z0| - p0, 0)/p1: rate at which what holds p0 slips under a torque z0."""
 
 
 #: The laws as expressions of the linear graph: arguments z1, z2, ..., coefficients p0, p1, ...
@@ -109,6 +111,7 @@ EXPRESSIONS = {
     Law.TABLE: 'table',
     Law.FRICTION_CIRCLE: (
         '(1/(1+(((p1*z1)**2+(p2*z2)**2)/p0**2)**1.5)**0.3333333333333333-1)*p1*z1'),
+    Law.YIELDING: '(2*z1+abs(z1-p0)-abs(z1+p0))/(2*p1)',
     Law.STICTION: (
         '-p0/p1*(held+p4*z1*(exp(-2*(z2/p3)**2)-(held/p1)**2'
         '+abs(exp(-2*(z2/p3)**2)-(held/p1)**2))/2)+0*p2'),
@@ -234,6 +237,8 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
             held, share = memory[HELD + int(p2)], z[o + 1] / coefficients[c, j, 3]
             free = math.exp(-2.0 * share * share) - held * held / (p1 * p1)
             out[j] = -p0 / p1 * (held + coefficients[c, j, 4] * max(free, 0.0) * z[o])
+        elif law == 18:
+            out[j] = math.copysign(max(abs(z[o]) - p0, 0.0), z[o]) / p1
         elif law == 15:
             selector = int(p0)
             out[j] = _table(coefficients, c, j, z[o] if selector < 0 else context[selector])

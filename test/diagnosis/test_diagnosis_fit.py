@@ -4,21 +4,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.conclusion import estimates
+from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, sensor_variance
-from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.observation import APART, Reading, simulate
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
-from lg_husky_sim.diagnosis.selection.rounds import calibrated
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
+from lg_husky_sim.diagnosis.selection.rounds import calibrated, play_round
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 ROBOT = {'wheel_damping': 1.3, 'yaw_damping': 14.0}
 COUNT = 12
@@ -49,3 +55,82 @@ def test_a_fit_finds_the_numbers_and_its_intervals_cover(drive: Callable[..., Re
             hits += [e.low <= truth[e.name] <= e.high
                      for e in estimates(again, list(ROBOT), model.parameters)]
     assert np.mean(hits) >= 0.85
+
+
+@pytest.mark.parametrize(('shape', 'sizes'), [
+    ('firm', {'radius_change': -0.03}), ('soft', {'radius_change': -0.03, 'tyre_drag': 8.0}),
+    ('firm_contact', {'radius_change': 0.05})])
+def test_an_effect_gets_the_form_that_does_best(
+        shape: str, sizes: dict[str, float], record: Callable[..., Recording],
+        steps: Sequence[tuple[float, float, float]]) -> None:
+    """A smaller wheel is one; a soft tyre, which rolls harder too, and a larger one are others."""
+    model, effect = load_model(), Effect('wheel_radius_mismatch', 'left', shape)
+    plant = compile_model(model.structure.with_effect(effect)).at(
+        model.parameters.with_entries(*entries_of(effect, sizes)))
+    drives = drives_of([record('ahead', plant, steps, 5)])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    pool = [h for h in hypotheses(model.structure)
+            if h.effect.id in ('wheel_radius_mismatch', 'rolling_resistance', 'yaw_pull')]
+    with ThreadPoolExecutor(1) as threads:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), threads)
+        evidence, base = calibrated(evidence, start, 1)
+        best = play_round(evidence, base, pool, start).tried[0]
+    assert best.hypothesis.effect == effect
+    for name, value in sizes.items():
+        assert best.fit.point.values[name] == pytest.approx(value, rel=0.25), name
+
+
+def test_derivatives_are_those_of_one_number_after_the_other(
+        drive: Callable[..., Recording]) -> None:
+    """Numbers that move readings of different sensors share a simulation."""
+    drives, model = drives_of([drive('ahead', 'nothing', 1)]), load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    assert {name for row in APART for name in row} - {'imu_window'} <= {
+        u.name for u in start.unknowns}
+    with ThreadPoolExecutor(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        predicted = evidence.predict(start)
+        which = list(range(len(start.unknowns)))[::-1]
+        found = evidence.derivatives(start, predicted, which)[0]
+        for column, k in enumerate(which):
+            moved = np.array(start.places)
+            moved[k] += start.unknowns[k].step
+            expected = (evidence.predict(start.at(moved))[0] - predicted[0]
+                        ) / start.unknowns[k].step
+            assert np.any(expected), start.unknowns[k].name
+            np.testing.assert_array_equal(found[:, column], expected,
+                                          start.unknowns[k].name)
+
+
+def test_a_motion_is_simulated_once_for_the_same_numbers(drive: Callable[..., Recording]) -> None:
+    """Until it is forgotten: memory is bounded."""
+    (one,) = drives_of([drive('ahead', 'nothing', 1)])
+    plant = compile_model(load_model().structure).at(load_model().parameters)
+    first = simulate(plant, one, Reading())
+    again = compile_model(load_model().structure).at(load_model().parameters)
+    assert again is not plant
+    assert simulate(again, one, Reading(values={'gyro_offset': 0.1})).rows is first.rows
+    other = plant.sets[0].b * 1.01
+    pushed = replace(plant, sets=(replace(plant.sets[0], b=other),))
+    assert np.any(simulate(pushed, one, Reading()).rows != first.rows)
+    count = int(setting('motions_kept') * 1e6 / first.rows.nbytes)
+    for turn in range(count + 1):
+        simulate(plant, one, Reading(values={'delay_imu': 1e-4 * (turn + 1)}))
+    assert simulate(plant, one, Reading()).rows is not first.rows
+
+
+def test_a_step_stays_inside_the_bounds_and_makes_the_best_of_them() -> None:
+    """As a bounded linear least squares problem of scipy's does."""
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        rows, target = rng.standard_normal((60, 8)), rng.standard_normal(60)
+        free = lsq_linear(rows, target).x
+        reach = np.full(8, 10.0)
+        # One that is at its bound, one that the step would take beyond it.
+        reach[2], reach[5] = 0.0, 0.4 * abs(free[5])
+        move = step_inside(rows.T @ rows, rows.T @ target, -reach, reach)
+        expected = lsq_linear(rows, target, (-reach - 1e-12, reach + 1e-12), tol=1e-12).x
+        np.testing.assert_allclose(move, expected, atol=1e-5)
+        assert np.all(np.abs(move) <= reach)

@@ -15,7 +15,7 @@ from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, neutral_of
-from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 import numpy as np
@@ -83,6 +83,20 @@ def test_every_effect_of_the_catalogue_is_offered_to_a_plain_model() -> None:
     assert len({h.label for h in ALL}) == len(ALL)
     assert {'slope', 'gyro_scale', 'payload'} <= {h.effect.id for h in ALL}
     assert Effect('coulomb_drivetrain', 'left') in [h.effect for h in ALL]
+
+
+def test_a_form_that_stands_for_others_is_offered_first() -> None:
+    standing = [(kind.id, shape, other) for kind in catalogue().values()
+                for shape, others in kind.stands_for.items() for other in others]
+    assert standing
+    for name, shape, other in standing:
+        offered = [h for h in ALL if h.effect.id == name]
+        assert other not in [h.effect.shape for h in offered]
+        for own in (h for h in offered if h.effect.shape == shape):
+            (later,) = [h for h in own.others if h.effect.shape == other]
+            assert later.effect == Effect(name, own.effect.side, other)
+            assert {p.name for p in later.free} <= {p.name for p in own.free}
+            assert not later.others
 
 
 def small(hypothesis: Hypothesis) -> dict[str, float]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 import enum
+from threading import Lock
 from typing import Any, TypeVar
 
 from lg_husky_sim.diagnosis.settings import setting
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 Kept = TypeVar('Kept')
+_KEEPING = Lock()
 
 
 class Channel(enum.IntEnum):
@@ -120,6 +122,21 @@ class Drive:
             memory[key] = made
             return made
         found: Kept = memory.get(key) or make()
+        return found
+
+    def rows(self, key: Hashable, make: Callable[[], FloatArray]) -> FloatArray:
+        """Return the simulated rows of a key if they were among the last ones; else make them."""
+        memory: dict[Hashable, FloatArray] = self.__dict__.setdefault('_rows', {})
+        with _KEEPING:
+            found = memory.pop(key, None)
+        if found is None:
+            found = make()
+            found.flags.writeable = False
+        with _KEEPING:
+            room = setting('motions_kept') * 1e6 - found.nbytes
+            while memory and sum(one.nbytes for one in memory.values()) > room:
+                del memory[next(iter(memory))]
+            memory[key] = found
         return found
 
     def slice_of(self, channel: Channel) -> slice:

@@ -18,7 +18,9 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
+import itertools
 
+from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.diagnosis.evidence.deviation import slow_model
 from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.frames import frame_of
@@ -29,7 +31,14 @@ from lg_husky_sim.diagnosis.evidence.noise import (
     Whitener,
     whitener_of,
 )
-from lg_husky_sim.diagnosis.evidence.observation import Motion, observe, Reading, simulate
+from lg_husky_sim.diagnosis.evidence.observation import (
+    APART,
+    Motion,
+    moved_by,
+    observe,
+    Reading,
+    simulate,
+)
 from lg_husky_sim.diagnosis.evidence.repaired_commands import repaired
 from lg_husky_sim.diagnosis.evidence.unknowns import start_of, Unknown, values_of
 from lg_husky_sim.diagnosis.settings import setting
@@ -100,11 +109,15 @@ class Point:
         """One over the deviations of the priors."""
         return np.array([1.0 / u.deviation for u in self.unknowns])
 
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Least and largest places of the unknowns."""
+        return (np.array([u.lower for u in self.unknowns]),
+                np.array([u.upper for u in self.unknowns]))
+
     def at(self, places: FloatArray) -> Point:
         """Return this structure at other places, inside the bounds."""
-        lower = np.array([u.lower for u in self.unknowns])
-        upper = np.array([u.upper for u in self.unknowns])
-        return replace(self, places=np.clip(places, lower, upper))
+        return replace(self, places=np.clip(places, *self.bounds))
 
 
 def beginning(structure: Structure, unknowns: Sequence[Unknown], parameters: Parameters,
@@ -199,16 +212,32 @@ class Evidence:
     def derivatives(self, point: Point, predicted: Sequence[FloatArray],
                     which: Sequence[int]) -> list[FloatArray]:
         """Return derivatives of the readings of each drive by some of the places."""
-        def column(k: int) -> list[FloatArray]:
-            moved = np.array(point.places)
-            step = point.unknowns[k].step
-            if moved[k] + step > point.unknowns[k].upper:
-                step = -step
-            moved[k] += step
-            shifted = self.predict(point.at(moved))
-            return [(a - b) / step for a, b in zip(shifted, predicted, strict=True)]
-        columns = list(self.pool.map(column, which))
-        return [np.column_stack([c[d] for c in columns]) for d in range(len(self.drives))]
+        names = {u.name: k for k, u in enumerate(point.unknowns) if u.kind == 'log'}
+        together = [own for row in APART if len(own := [
+            names[name] for name in row if names.get(name) in which]) > 1]
+        alone = set(which).difference(*together)
+
+        def columns(ks: Sequence[int]) -> list[tuple[int, list[FloatArray]]]:
+            steps = np.zeros(len(point.unknowns))
+            for k in ks:
+                unknown = point.unknowns[k]
+                over = point.places[k] + unknown.step > unknown.upper
+                steps[k] = -unknown.step if over else unknown.step
+            shifted = self.predict(point.at(point.places + steps))
+            changes = [a - b for a, b in zip(shifted, predicted, strict=True)]
+            if len(ks) == 1:
+                return [(ks[0], [change / steps[ks[0]] for change in changes])]
+            found = []
+            for k in ks:
+                parts = [np.zeros_like(change) for change in changes]
+                for part, change, drive in zip(parts, changes, self.drives, strict=True):
+                    for rows in moved_by(point.unknowns[k].name, drive):
+                        part[rows] = change[rows] / steps[k]
+                found.append((k, parts))
+            return found
+        made = dict(itertools.chain.from_iterable(
+            self.pool.map(columns, [*([k] for k in which if k in alone), *together])))
+        return [np.column_stack([made[k][d] for k in which]) for d in range(len(self.drives))]
 
     def fit(self, start: Point, slopes: Sequence[FloatArray] | None = None, *,
             rounds: int = 8, renew: Sequence[int] | None = None, inflation: float = 1.0) -> Fit:
@@ -256,7 +285,8 @@ class Evidence:
             scale = np.diag(normal) + 1e-12
             before, fell, hoped = cost, False, 1.0
             for _ in range(5):
-                move = np.linalg.solve(normal + damping * np.diag(scale), slope)
+                move = step_inside(normal + damping * np.diag(scale), slope,
+                                   *(bound - point.places for bound in point.bounds))
                 tried = point.at(point.places + move)
                 hoped = float(slope @ move - 0.5 * move @ normal @ move)
                 try:

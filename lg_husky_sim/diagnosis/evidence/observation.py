@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 import enum
+from hashlib import blake2b
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.settings import setting
@@ -66,6 +67,21 @@ class Reading:
     def replacing(self, values: Mapping[str, float]) -> Reading:
         """Return this with other values."""
         return replace(self, values={**self.values, **values})
+
+
+#: Numbers of a reading that move readings of different sensors, each only its own: one simulation
+#: has the derivatives by all of them. The last two rows do not even need another one.
+APART = (('delay_wheels', 'delay_imu', 'delay_pose'), ('wheel_window', 'imu_window'),
+         ('gyro_offset', 'pose_turn'), ('gyro_gain', 'pose_lever'))
+_WHEELS = (Channel.WHEEL_LEFT, Channel.WHEEL_RIGHT, Channel.ANGLE_LEFT, Channel.ANGLE_RIGHT)
+_POSE = (Channel.X, Channel.Y, Channel.HEADING)
+_MOVED = {'delay_wheels': _WHEELS, 'wheel_window': _WHEELS, 'delay_pose': _POSE,
+          'pose_turn': _POSE, 'pose_lever': _POSE}
+
+
+def moved_by(name: str, drive: Drive) -> list[slice]:
+    """Return where the readings stand that one of the numbers of :data:`APART` moves."""
+    return [drive.slice_of(channel) for channel in _MOVED.get(name, (Channel.YAW_RATE,))]
 
 
 _COLUMN = {name: i for i, name in enumerate(COLUMNS)}
@@ -187,11 +203,27 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
     delays = (sensors.delay_wheels + reading.get('delay_wheels'),
               sensors.delay_imu + reading.get('delay_imu'),
               sensors.delay_pose + reading.get('delay_pose'))
-    key = (reading.wheels, reading.imu, reading.get('wheel_window'),
+    # A low pass follows the motion wherever its time constant.
+    window = reading.get('wheel_window') if reading.wheels is not WheelReading.FILTERED else 0.0
+    key = (reading.wheels, reading.imu, window,
            reading.values.get('imu_window'), reading.get('command_delay'), delays, probe)
     wanted = drive.remembered(key, lambda: _wanted(drive, reading, delays, probe))
-    propagator = Propagator(plant)
+    rows = drive.rows((key, _signature(plant)), lambda: _driven(plant, drive, wanted.events))
     events = wanted.events
+    times = events.times
+    if events.order is not None:
+        times = np.empty_like(events.times)
+        times[events.order] = events.times
+    return Motion(times, rows, wanted, plant)
+
+
+def _driven(plant: Plant, drive: Drive, events: Events) -> FloatArray:
+    # Rows of the kernel.
+    kept = plant.__dict__
+    # One for all drives: the modes of a plant are found once.
+    if '_propagator' not in kept:
+        kept['_propagator'] = Propagator(plant)
+    propagator: Propagator = kept['_propagator']
     commands = TimeSeries(events.stamps, events.values, drive.commands.names)
     before = commanded_until(drive.start, commands, drive.twist, drive.wheel_rates)
     twist = drive.twist
@@ -202,12 +234,22 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
         twist = BodyTwist(0.5 * (left + right) / ahead, (right - left) / (turning[1] - turning[0]))
     state = propagator.initial(drive.pose, twist, drive.start, drive.wheel_rates,
                                drive.wheel_angles, before)
-    rows = propagator.run(events, state, fine_pose=False)
-    times = events.times
-    if events.order is not None:
-        times = np.empty_like(events.times)
-        times[events.order] = events.times
-    return Motion(times, rows, wanted, plant)
+    return propagator.run(events, state, fine_pose=False)
+
+
+def _signature(plant: Plant) -> bytes:
+    # Of all that makes a plant move; its sensors do not.
+    kept = plant.__dict__
+    if '_signature' not in kept:
+        parts = [repr((plant.onset, plant.states)).encode()]
+        for one in plant.sets:
+            parts.append(repr(one.command).encode())
+            parts += [array.tobytes() for array in (
+                one.a, one.b, one.g, one.h, one.k, one.rows, one.rows_u, one.rows_f, one.laws,
+                one.offsets, one.coefficients)]
+        kept['_signature'] = blake2b(b'|'.join(parts)).digest()
+    found: bytes = kept['_signature']
+    return found
 
 
 def _rate(motion: Motion, drive: Drive, side: str, reading: Reading, late: float) -> FloatArray:

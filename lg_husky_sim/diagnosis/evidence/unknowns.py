@@ -84,13 +84,14 @@ def window_unknown(name: str, usual: float, longest: float) -> Unknown:
 
 
 def effect_unknown(parameter: EffectParameter, start: float) -> Unknown:
-    """Return a number of an effect as an unknown; positive ones on a logarithmic scale."""
-    positive = parameter.lower >= 0.0 and parameter.name not in NEUTRAL
+    """Return a number of an effect as an unknown; most positive ones on a logarithmic scale."""
+    positive = parameter.lower >= 0.0 and parameter.name not in NEUTRAL and not parameter.linear
     if positive:
         least = max(parameter.lower, 1e-4 * abs(start))
         return Unknown(parameter.name, 'effect', True, math.log(abs(start)), math.inf,
                        math.log(least), math.log(parameter.upper), setting('effect_step'))
-    size = abs(start - NEUTRAL.get(parameter.name, 0.0))
+    size = parameter.starts[0] if parameter.linear else abs(
+        start - NEUTRAL.get(parameter.name, 0.0))
     return Unknown(parameter.name, 'effect', False, start, math.inf, parameter.lower,
                    parameter.upper, setting('effect_step') * max(size, 1e-9))
 

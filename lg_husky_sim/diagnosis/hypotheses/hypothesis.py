@@ -55,6 +55,12 @@ class Hypothesis:
         """Estimated parameters of the effect."""
         return tuple(p for p in self.effect.parameters() if not p.fixed)
 
+    @property
+    def others(self) -> tuple[Hypothesis, ...]:
+        """This effect in the other forms that its own stands for."""
+        return tuple(replace(self, effect=replace(self.effect, shape=shape))
+                     for shape in self.effect.kind.stands_for.get(self.effect.shape, ()))
+
     def at(self, onset: Onset | None) -> Hypothesis:
         """Return this effect with another onset."""
         return replace(self, effect=replace(self.effect, late=onset is not None), onset=onset)
@@ -95,9 +101,10 @@ class Hypothesis:
 
 
 def proportional(parameter: EffectParameter) -> bool:
-    """Return whether a number may have either sign, so that small ones act in proportion."""
+    """Return whether small sizes of a number act in proportion: it has either sign, or says so."""
     neutral = neutral_of(parameter)
-    return neutral is not None and parameter.lower < neutral < parameter.upper
+    return neutral is not None and (
+        parameter.linear or parameter.lower < neutral < parameter.upper)
 
 
 def _tried(parameter: EffectParameter, start: Numbers) -> float:
@@ -137,15 +144,17 @@ def hypotheses(structure: Structure) -> tuple[Hypothesis, ...]:
     -------
     tuple of Hypothesis
         Without effects that it has, without those that share a number with one it has, and
-        without those of the catalogue that a diagnosis does not try.
+        without those of the catalogue that a diagnosis does not try, and without forms that
+        another one stands for.
     """
     taken = {p.name for e in structure.effects for p in e.parameters()}
     found = []
     for name, kind in ((name, kind) for name, kind in catalogue().items() if kind.tried):
+        later = {shape for others in kind.stands_for.values() for shape in others}
         for side, shape in itertools.product(kind.sides, kind.shapes):
             effect = Effect(name, side, shape)
             free = [p for p in effect.parameters() if not p.fixed]
-            if taken & {p.name for p in effect.parameters()}:
+            if taken & {p.name for p in effect.parameters()} or shape in later:
                 continue
             count = max(len(p.starts) for p in free)
             starts = tuple({p.name: p.starts[min(i, len(p.starts) - 1)] for p in free}

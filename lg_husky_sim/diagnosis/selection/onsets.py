@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, Numbers
 from lg_husky_sim.diagnosis.selection.screening import (
     begin,
     gain_of,
-    in_proportion,
+    limits_of,
     Look,
     Projection,
 )
@@ -90,10 +90,10 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
             columns = _columns(evidence, base, motions, patterns, hypothesis, group)
             if columns is None:
                 continue
-            flags = in_proportion(hypothesis, group)
+            limits = limits_of(hypothesis, group)
             for onset, normal, slope in zip(onsets, *projection.problems(columns, len(group)),
                                             strict=True):
-                gain, coefficients = gain_of(normal, slope, flags)
+                gain, coefficients = gain_of(normal, slope, limits)
                 if gain > (0.0 if best is None else best.gain):
                     at = hypothesis.at(onset)
                     best = Look(at, begin(at, group, coefficients), gain)

@@ -201,11 +201,20 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         tried = fitted(evidence, base, chosen, [base.point, guide], seen)
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
+    tried = [_best_form(evidence, base, t) for t in tried[:2]] + tried[2:]
     tried.sort(key=lambda t: (is_negligible(t), -t.score))
     tried = _from_the_start(evidence, base, tried)
     best = tried[0]
     chance = 1.0 if is_negligible(best) else _chance(evidence, best, starts)
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
+
+
+def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:
+    # Of the forms that one stands for: numbers more are for those that do not do as well without.
+    there = base.point.at(tried.fit.point.places[:base.point.places.size])
+    found = [attempt(evidence, base, other, [(there, numbers_of(tried))])
+             for other in tried.hypothesis.others]
+    return max([tried, *(one for one in found if one is not None)], key=lambda t: t.score)
 
 
 def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[Tried]:

@@ -12,8 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.unknowns import NEUTRAL
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     Hypothesis,
     neutral_of,
@@ -116,7 +118,7 @@ class Projection:
         return normal, slope
 
 
-def gain_of(normal: FloatArray, slope: FloatArray, free: Sequence[bool]
+def gain_of(normal: FloatArray, slope: FloatArray, limits: Sequence[tuple[float, float]]
             ) -> tuple[float, FloatArray]:
     """
     Return the gain of projected columns [nats] and their coefficients.
@@ -125,18 +127,22 @@ def gain_of(normal: FloatArray, slope: FloatArray, free: Sequence[bool]
     ----------
     normal : numpy.ndarray, shape (m, m)
     slope : numpy.ndarray, shape (m,)
-    free : sequence of bool
-        Whether a coefficient may have any value; others stay near the size that was
-        simulated, since such numbers do not act in proportion.
+    limits : sequence of (float, float)
+        Of each coefficient, see :func:`limits_of`.
     """
     size = np.sqrt(np.maximum(np.diag(normal), 0.0))
     if not np.all(np.isfinite(size)) or np.any(size <= setting('rounding')):
         return 0.0, np.ones(size.size)
     scaled = normal / np.outer(size, size) + 1e-9 * np.eye(size.size)
     coefficients = np.linalg.solve(scaled, slope / size) / size
-    low, high = setting('least_factor'), setting('most_factor')
-    kept = np.where(np.asarray(free, dtype=np.bool_), coefficients,
-                    np.clip(coefficients, low, high))
+    kept = np.clip(coefficients, *np.transpose(limits))
+    inside = kept == coefficients
+    if np.any(inside) and not np.all(inside):
+        # The others make the best of what the limits leave.
+        rest = slope[inside] / size[inside] - scaled[np.ix_(inside, ~inside)] @ (
+            kept * size)[~inside]
+        kept[inside] = np.clip(np.linalg.solve(scaled[np.ix_(inside, inside)], rest)
+                               / size[inside], *np.transpose(limits)[:, inside])
     return float(kept @ slope - 0.5 * kept @ normal @ kept), kept
 
 
@@ -170,7 +176,7 @@ def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]
         if not all(np.all(np.isfinite(one)) for one in stacked):
             return None
         normal, slope = projection.problem(evidence.whiten(stacked))
-        gain, coefficients = gain_of(normal, slope, in_proportion(hypothesis, group))
+        gain, coefficients = gain_of(normal, slope, limits_of(hypothesis, group))
         return _Rung(group, normal, slope, gain, coefficients)
 
     def seen(hypothesis: Hypothesis) -> Look | None:
@@ -233,6 +239,29 @@ def in_proportion(hypothesis: Hypothesis, group: Sequence[Numbers]) -> list[bool
     return flags if len(group) == len(flags) else [all(flags)]
 
 
+def limits_of(hypothesis: Hypothesis, group: Sequence[Numbers]) -> list[tuple[float, float]]:
+    """
+    Return how far the coefficient of each column of a group may go.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    group : sequence of mapping
+
+    Returns
+    -------
+    list of (float, float)
+        Any that the bounds of a number allow, where it acts in proportion; others stay near the
+        size that was simulated.
+    """
+    near = (setting('least_factor'), setting('most_factor'))
+    flags = in_proportion(hypothesis, group)
+    if len(flags) < len(hypothesis.free):
+        return [(-math.inf, math.inf) if flag else near for flag in flags]
+    return [(0.0 if p.linear else -math.inf, math.inf) if flag else near
+            for p, flag in zip(hypothesis.free, flags, strict=True)]
+
+
 def begin(hypothesis: Hypothesis, group: Sequence[Numbers], coefficients: FloatArray
           ) -> Numbers:
     """Return where the linear problem ends, for numbers that act in proportion; else the start."""
@@ -245,7 +274,7 @@ def begin(hypothesis: Hypothesis, group: Sequence[Numbers], coefficients: FloatA
             found[parameter.name] = start
             continue
         value = neutral + float(factor) * (start - neutral)
-        if parameter.lower >= 0.0 and parameter.name not in ('gyro_factor', 'encoder_factor'):
+        if parameter.lower >= 0.0 and parameter.name not in NEUTRAL:
             value = start * float(factor)
         found[parameter.name] = min(max(value, parameter.lower), parameter.upper)
     return found

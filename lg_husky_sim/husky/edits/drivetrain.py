@@ -27,6 +27,14 @@ def _belt(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     if all(branch.name != 'K_BeltL' for branch in network.graph.branches):
         raise ParameterError(
             f'effect {effect.id} needs the expanded drivetrain (structure.drivetrain)')
+    if effect.shape == 'elastic':
+        return network
+    # A belt jumps or slips on its pulley where it is stretched by more than it can hold.
+    for letter in 'LR':
+        spring = f'K_Belt{letter}'
+        row = LawRow(Law.YIELDING, ('belt_hold', 'belt_slip_damping'))
+        network = network.with_rate_before(f'W_slip_{letter}', (spring, f'B_Belt{letter}'), row,
+                                           (f'tau({spring})',))
     return network
 
 

@@ -100,6 +100,18 @@ class EditedNetwork:
         graph = self.graph.replacing(replace(winding, tail=node)).with_branches(source)
         return replace(self, graph=graph, laws={**self.laws, name: row})
 
+    def with_rate_before(self, name: str, elements: tuple[str, ...], row: LawRow,
+                         of: tuple[str, ...]) -> EditedNetwork:
+        """Return this network with a modulated across-source in series with elements."""
+        behind = [branch_of(self.graph, one) for one in elements]
+        tail, node = behind[0].tail, f'{behind[0].tail}_{name}'
+        source = Branch(name, Kind.ACROSS_SOURCE, behind[0].domain, tail, node,
+                        characteristic=_characteristic(row, of))
+        graph = self.graph
+        for one in behind:
+            graph = graph.replacing(replace(one, tail=node))
+        return replace(self, graph=graph.with_branches(source), laws={**self.laws, name: row})
+
     def with_slip_torque(self, name: str, wheel: str, row: LawRow, *others: str
                          ) -> EditedNetwork:
         """Return this network with a modulated through-source beside a wheel's slip element."""

@@ -16,6 +16,7 @@ from lg_husky_sim.husky.edits.network import (
 )
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.laws import Law
+from lg_husky_sim.linear_graph import Domain
 
 
 def _saturation(network: EditedNetwork, effect: Effect) -> EditedNetwork:
@@ -44,9 +45,25 @@ def _with_circle(network: EditedNetwork, wheel: str, damping: str) -> EditedNetw
 
 def _radius(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     numbers = range(1, 5) if effect.side == 'left' else range(5, 9)
-    return network.with_values({
+    radius = '(wheel_radius*(1+radius_change))'
+    network = network.with_values({
         f'TF_{n}': str(element_of(network.graph, f'TF_{n}').value).replace(
-            'wheel_radius', '(wheel_radius*(1+radius_change))') for n in numbers})
+            'wheel_radius', radius) for n in numbers})
+    if effect.shape.endswith('contact'):
+        network = network.with_values({
+            f'B_{wheel}': f'({branch_of(network.graph, f"B_{wheel}").value})*(1+radius_change)**2'
+            for wheel in WHEELS[effect.side]})
+    if effect.shape.startswith('firm'):
+        return network
+    # What holds a soft tyre back acts at its tread: on the chassis, with half the track as its
+    # arm. A source's own rate is that of its node with the other sign.
+    for wheel in WHEELS[effect.side]:
+        name = f'T_drag_{wheel}'
+        row = LawRow(Law.COULOMB, (f'-(tyre_drag/2)*{radius}', f'tyre_drag_speed/{radius}', 0.0,
+                                   1.0))
+        network = network.with_force(name, Domain.ROTATIONAL, f'tread{wheel}', 'r', row,
+                                     (f'omega({name})',))
+    return network
 
 
 EDITS = {
