@@ -26,7 +26,7 @@ def step_inside(normal: FloatArray, slope: FloatArray, low: FloatArray, high: Fl
     -------
     numpy.ndarray, shape (k,)
     """
-    move: FloatArray = np.linalg.solve(normal, slope)
+    move: FloatArray = np.asarray(np.linalg.solve(normal, slope), dtype=np.float64)
     free = np.ones(move.size, dtype=np.bool_)
     for _ in range(move.size):
         beyond = free & ((move < low) | (move > high))
