@@ -100,6 +100,7 @@ class Commands:
         while not self._heard_by_name():
             self._tool.serve()
             if time.monotonic() > end:
+                self.settle()
                 raise CommandError(self._silence(seconds))
         names = ', '.join(dict.fromkeys(
             f'{one.node} ({one.kind.rpartition("/")[2]})' for one in self.robots()))

@@ -143,9 +143,11 @@ _PAIRS = (
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    # Pairs of integrals over all segments, and the windows in which they are compared.
+    # Pairs of integrals over all segments, and the windows in which they are compared. A speed has
+    # no offset: on a drive at one speed it would take the factor's place.
 
     ways: tuple[tuple[Way, Way, FloatArray], ...]
+    offset: bool
 
     def rows(self, late: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray,
                                          NDArray[np.int64]]:
@@ -205,7 +207,7 @@ def _relation(parts: Sequence[Segment], quantity: str, names: tuple[str, str],
     seconds = sum(float(e[-1] - e[0]) for _, _, e in ways)
     if seconds < setting('least_compared'):
         return None
-    windows = _Windows(tuple(ways))
+    windows = _Windows(tuple(ways), quantity != 'speed')
     if _moved(windows, quantity, names[0]) < setting('least_moved'):
         return None
     steps = round(reach / setting('late_step'))
@@ -246,7 +248,7 @@ def _spread(values: FloatArray) -> float:
 def _misfit(windows: _Windows, late: float) -> float:
     # Absolute, not squared: jumps of a pose shall not choose the lateness.
     reference, source, span, _, _ = windows.rows(late)
-    _, left, _ = _robust(np.column_stack([source, span]), reference)
+    _, left, _ = _robust(np.column_stack([source, span * windows.offset]), reference)
     return float(np.mean(np.abs(left)))
 
 
@@ -256,12 +258,14 @@ def _refined(windows: _Windows, late: float, quantity: str, names: tuple[str, st
     begun = late
     for _ in range(int(setting('late_rounds'))):
         reference, source, span, slope, blocks = windows.rows(late)
+        span = span * windows.offset
         best, left, weight = _robust(np.column_stack([source, span]), reference)
         table = np.column_stack([source, span, best[0] * slope])
         move = np.linalg.lstsq(table * weight[:, None], left * weight, rcond=None)[0][2]
         late = float(np.clip(late + move, begun - setting('late_step'),
                              begun + setting('late_step')))
     reference, source, span, slope, blocks = windows.rows(late)
+    span = span * windows.offset
     best, left, weight = _robust(np.column_stack([source, span]), reference)
     table = np.column_stack([source, span, best[0] * slope])
     square = weight ** 2
