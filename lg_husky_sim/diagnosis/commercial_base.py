@@ -47,10 +47,11 @@ class CommercialBase:
     @property
     def words(self) -> str:
         """What the base does, in words."""
+        dead = f'{self.values["dead_time"]:.2f}'
+        late = '' if float(dead) == 0.0 else f', acts {dead} s late'
         return ('a base that limits its acceleration at '
                 f'{self.values["slew_forward"]:.3g} m/s² and '
-                f'{self.values["slew_yaw"]:.3g} rad/s², acts '
-                f'{self.values["dead_time"]:.2g} s late and closes a wheel-speed loop')
+                f'{self.values["slew_yaw"]:.3g} rad/s²{late} and closes a wheel-speed loop')
 
 
 def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],

@@ -21,6 +21,7 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.recording import Recording, Segment
+from lg_husky_sim.reporting.words import capitalised
 
 
 @dataclass(frozen=True)
@@ -90,9 +91,7 @@ def misfit(found: Sequence[Difference], search: Search, plain_out: Mapping[str, 
             plant = compile_model(base.model.structure).at(base.model.parameters)
             out, everywhere = errors(plant, test), errors(plant, parts)
     better = base is not None and _better(plain_out, out)
-    text = '; '.join(one.statement for one in found)
-    if first.on_ground:
-        text = f'This model does not fit this robot: {text}'
+    text = capitalised('; '.join(one.statement for one in found))
     text = f'{text}.{_said(base, better, plain_out, out)}'
     finding = Finding('unknown', 'none', first.subsystem, first.elements, first.regime, None, (),
                       0.5 * first.certainty ** 2, math.nan, 1.0, (), text)
@@ -111,13 +110,13 @@ def _said(base: CommercialBase | None, better: bool, plain: Mapping[str, float],
           out: Mapping[str, float]) -> str:
     if base is None:
         return ''
-    words = base.words[0].upper() + base.words[1:]
+    words = capitalised(base.words)
     if not better:
         return f' {words} was tried as one hypothesis; it does not predict better.'
-    shown = ', '.join(
+    shown = ' and '.join(
         f'{label} to {out[name]:.2g} instead of {plain[name]:.2g} {unit}'
         for name, label, unit in (('wheel_speed_rmse', 'wheel rates', 'rad/s'),
                                   ('yaw_rate_rmse', 'yaw rates', 'rad/s'))
         if name in out and name in plain)
-    return (f' {words}, tried as one hypothesis, predicts held-out {shown}; model.yaml runs '
-            'like it.')
+    return (f' {words}, tried as one hypothesis, predicts held-out {shown}; '
+            '`model.yaml` runs like it.')

@@ -10,6 +10,7 @@ from pathlib import Path
 from lg_husky_sim.diagnosis.before_after.diagnose_change import ChangeCase
 from lg_husky_sim.diagnosis.before_after.report import change_report
 from lg_husky_sim.diagnosis.diagnose import Case
+from lg_husky_sim.diagnosis.report import unnamed
 from lg_husky_sim.diagnosis.report_of_case import case_report
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Verdict
 from lg_husky_sim.husky.model_file import save_model
@@ -66,7 +67,8 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
     """
     lines = [f'{headline(diagnosis, changed)} (confidence {diagnosis.confidence:.2f})']
     for finding in diagnosis.findings:
-        lines.append(f'  {finding.effect}: {finding.statement}')
+        name = '' if finding.effect == 'unknown' else f'{finding.effect}: '
+        lines.append(f'  {name}{finding.statement}')
         evidence = f'gain {finding.held_out_gain:.0f} nats, {finding.chance}; ' if (
             finding.chance) else ''
         rivals = [f'{r.effect} {r.held_out_gain:.0f}' for r in finding.rivals
@@ -77,14 +79,26 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
     for group in diagnosis.indistinguishable:
         lines.append(f'  cannot be told apart: {", ".join(group.effects)}; '
                      f'would separate them: {"; ".join((*group.sensors, *group.manoeuvres))}')
-    lines.append(f'  {"error on":22} {"all data:":>12} {"":>12}   {"held-out data:":>14}')
-    lines.append(f'  {"":22}' + f' {RECALIBRATED:>12} {WITH_FINDING:>12}  ' * 2)
-    for label, *cells in error_table(diagnosis):
-        lines.append(f'  {label:22} {cells[0]:>12} {cells[1]:>12}   {cells[2]:>12} {cells[3]:>12}')
-    lines.append(f'  remaining: {diagnosis.remaining}')
-    lines.extend(f'  sensors against each other: {text}' for text in diagnosis.sensors)
+    lines += _error_lines(diagnosis)
+    if diagnosis.fits:
+        lines.append(f'  remaining: {diagnosis.remaining}')
+    lines.extend(f'  sensors against each other: {text}' for text in unnamed(diagnosis))
     lines.extend(f'  note: {note}' for note in diagnosis.notes)
     return '\n'.join(lines)
+
+
+def _error_lines(diagnosis: Diagnosis) -> list[str]:
+    # Without a second column of the same numbers where nothing was added.
+    shown = (RECALIBRATED,) if diagnosis.model == diagnosis.plain_model else (
+        RECALIBRATED, WITH_FINDING)
+    places = [*range(len(shown)), *range(2, 2 + len(shown))]
+    wide = 13 * len(shown)
+    lines = [f'  {"error on":22}{"all data:":>{wide}}  {"held-out data:":>{max(wide, 15)}}',
+             f'  {"":22}' + f'{"".join(f"{name:>13}" for name in shown)}  ' * 2]
+    for label, *cells in error_table(diagnosis):
+        texts = [f'{cells[place]:>13}' for place in places]
+        lines.append(f'  {label:22}{"".join(texts[:len(shown)])}  {"".join(texts[len(shown):])}')
+    return lines
 
 
 def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,

@@ -10,6 +10,7 @@ import math
 from lg_husky_sim.diagnosis.before_after.settings import settings as before_after
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.diagnosis.wording import LATENESS, lateness_words
 from lg_husky_sim.husky.effects import catalogue, effect_kind, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.data import (
@@ -27,7 +28,7 @@ from lg_husky_sim.reporting.data import (
     WITH_FINDING,
 )
 from lg_husky_sim.reporting.sections import Cell, Section, Table, Tone
-from lg_husky_sim.reporting.words import capitalised, change, number, plural
+from lg_husky_sim.reporting.words import capitalised, change, number, plural, with_unit
 
 _STREAMS = {'wheels': 'the wheels (`/joint_states`)', 'imu': 'the IMU',
             'pose': 'the pose (`/tf`, odometry)'}
@@ -85,6 +86,8 @@ def onset_words(onset: Onset | None) -> str:
 
 def size_words(one: Estimate) -> str:
     """Return a number with its name and interval."""
+    if one.name == LATENESS or one.name.removesuffix('_late') in _STREAMS:
+        return f'stamps {lateness_words(one)}'
     unit = '' if one.unit in ('', '1') else f' {one.unit}'
     interval = f' ({number(one.low)} to {number(one.high)})' if (
         math.isfinite(one.low) and math.isfinite(one.high)) else ''
@@ -203,8 +206,9 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
     simulator: list[str] = []
     for finding in diagnosis.findings:
         if finding.effect == 'unknown' and not diagnosis.fits:
-            robot.append('Check the robot, its wheels and the frames of its pose; for another '
-                         'robot, give a model of its own: `--robot FILE.yaml`.')
+            robot.append('Check that the wheels are on the ground, that their rates are in rad/s, '
+                         'and that the pose is of this robot. If the model is of another robot, '
+                         'give it one of its own: `--robot FILE.yaml`.')
             continue
         if finding.effect == 'unknown':
             robot.append('Check the part of the robot that the report names, at the times that it '
@@ -214,9 +218,7 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
         values |= {'side': finding.side, 'where': 'both sides', 'wheels': 'the wheels'}
         if finding.side in _WHEELS:
             values |= {'where': f'{finding.side} side', 'wheels': _WHEELS[finding.side]}
-        stream = _STREAMS.get(shapes.get((finding.effect, finding.side), ''))
-        if stream:
-            values['stream'] = stream
+        values |= _stream_words(finding, shapes.get((finding.effect, finding.side), ''))
         other = before_after().advice.get(finding.effect)
         if other is not None:
             robot += other
@@ -230,13 +232,29 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
         if tell:
             robot.append(f'Before repairing anything: these recordings cannot tell {names} apart. '
                          f'These would: {tell}.')
-    simulator.append(
-        'Load the model with the finding: `ros2 run lg_husky_sim sim_node '
-        '--ros-args -p model:=model.yaml`.' if diagnosis.findings else
-        'Load the recalibrated model: `ros2 run lg_husky_sim sim_node --ros-args -p '
-        'model:=model.yaml`.')
+    if diagnosis.fits or diagnosis.model != diagnosis.plain_model:
+        simulator.append(f'Load the {_which(diagnosis)}: `ros2 run lg_husky_sim sim_node '
+                         '--ros-args -p model:=model.yaml`.')
     parts = (('On the robot', robot), ('In the simulator', simulator))
     return tuple(Advice(where, tuple(lines)) for where, lines in parts if lines)
+
+
+def _which(diagnosis: Diagnosis) -> str:
+    # What model.yaml is.
+    if not diagnosis.findings or diagnosis.model == diagnosis.plain_model:
+        return 'recalibrated model'
+    return 'model with the finding' if diagnosis.fits else (
+        'commercial base, the beginning of a model of this robot')
+
+
+def _stream_words(finding: Finding, shape: str) -> dict[str, float | str]:
+    # Of stamps: whose they are, and how late or early.
+    for one in finding.parameters:
+        stream = _STREAMS.get(shape if one.name == LATENESS else one.name.removesuffix('_late'))
+        if stream:
+            how = 'late' if one.value > 0.0 else 'early'
+            return {'stream': stream, 'offset': f'{with_unit(abs(one.value), one.unit)} {how}'}
+    return {}
 
 
 def competing(diagnosis: Diagnosis) -> tuple[Section, ...]:
@@ -265,10 +283,18 @@ def competing(diagnosis: Diagnosis) -> tuple[Section, ...]:
     return (Section('Competing effects', tuple(text), tables=tuple(tables)),) if tables else ()
 
 
+def unnamed(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Return what sensors say of each other that no finding says already."""
+    return tuple(text for text in diagnosis.sensors
+                 if not any(one.statement.startswith(text) for one in diagnosis.findings))
+
+
 def found_numbers(diagnosis: Diagnosis) -> tuple[Section, ...]:
     """Return the numbers of the findings with their intervals and evidence."""
     rows, points = [], []
     for finding in diagnosis.findings:
+        if finding.effect == 'unknown' and not diagnosis.fits:
+            continue
         rows += [(effect_words(finding), one.name.replace('_', ' '), number(one.value, 4),
                   f'{number(one.low, 4)} to {number(one.high, 4)}',
                   '' if one.unit == '1' else one.unit) for one in sizes(finding)]
@@ -327,12 +353,14 @@ def report_data(
              'a commercial base: limited commands, wheel-speed loop, tyres that saturate'
              if not diagnosis.fits else
              'refitted with a smooth description of what is missing'}
-    notes = (*(f'Sensors against each other: {text}.' for text in diagnosis.sensors),
-             *diagnosis.notes, *((f'What remains: {diagnosis.remaining}.',)
-                                 if diagnosis.remaining else ()))
+    remains = diagnosis.remaining if diagnosis.fits else ''
+    notes = (*(f'Sensors against each other: {text}.' for text in unnamed(diagnosis)),
+             *(f'{capitalised(one)}.' for one in diagnosis.notes),
+             *((f'What remains: {remains}.',) if remains else ()))
+    warnings = (*losses(errors), *(implausible(parameters) if diagnosis.fits else ()))
     return ReportData(
         f'{"What changed in " if changed else "Diagnosis of "}{", ".join(recordings)}',
-        headline(diagnosis, (*losses(errors), *implausible(parameters)), changed=changed), columns,
+        headline(diagnosis, warnings, changed=changed), columns,
         tuple((name, about[name]) for name in columns), tuple(traces), tuple(errors),
         advice(diagnosis, shapes or {}), view,
         tuple(Mismatch(m.recording, _SIGNALS.get(m.channel, m.channel), m.start,
@@ -340,7 +368,6 @@ def report_data(
               for m in diagnosis.mismatch),
         tuple(parameters),
         sections=(*found_numbers(diagnosis), *competing(diagnosis), *sections), notes=notes,
-        files=(('model.yaml', 'is the model with the finding' if diagnosis.findings
-                else 'is the recalibrated model'),
-               ('plain.yaml', 'is the recalibrated model without it'),
+        files=(('model.yaml', f'is the {_which(diagnosis)}'),
+               ('plain.yaml', 'is the recalibrated model with nothing added'),
                ('diagnosis.json', 'has all numbers')), provenance=provenance or Provenance())

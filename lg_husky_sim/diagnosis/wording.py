@@ -5,12 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 
 from lg_husky_sim.diagnosis.result import Estimate
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 
 _STREAMS = {'wheels': 'of the wheels (joint states)', 'imu': 'of the IMU',
             'pose': 'of the pose (tf or odometry)'}
+#: The number of an effect that says how late stamps are, or how early.
+LATENESS = 'stamp_delay'
 
 
 def onset_words(onset: Onset | None) -> str:
@@ -27,8 +30,17 @@ def onset_words(onset: Onset | None) -> str:
 def in_words(numbers: Sequence[Estimate]) -> str:
     """Return estimates as text with their intervals."""
     return ', '.join(
+        lateness_words(e) if e.name == LATENESS else
         f'{e.name.replace("_", " ")} {e.value:.3g}{"" if e.unit == "1" else " " + e.unit} '
         f'({e.low:.3g} to {e.high:.3g})' for e in numbers)
+
+
+def lateness_words(late: Estimate, digits: int = 3) -> str:
+    """Return how late or early stamps are, such as ``0.24 s early (0.22 to 0.25)``."""
+    sign = math.copysign(1.0, late.value)
+    low, high = sorted((sign * late.low, sign * late.high))
+    return (f'{abs(late.value):.{digits}g} {late.unit} {"late" if sign > 0.0 else "early"} '
+            f'({low:.{digits}g} to {high:.{digits}g})')
 
 
 def effect_words(effect: Effect) -> str:
@@ -36,7 +48,7 @@ def effect_words(effect: Effect) -> str:
     side = '' if effect.side in ('none', '') else {
         'both': ' (both sides)', 'left': ' (left side)', 'right': ' (right side)'}[effect.side]
     if effect.id == 'sensor_time_offset':
-        return f'the stamps {_STREAMS[effect.shape]} lag behind'
+        return f'the stamps {_STREAMS[effect.shape]} are off'
     return f'{effect.kind.title}{side}'
 
 

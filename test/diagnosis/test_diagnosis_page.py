@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.report import advice, headline, implausible, losses, sizes
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
-from lg_husky_sim.husky.effects import catalogue
+from lg_husky_sim.diagnosis.wording import sentence
+from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.reporting.advice import names_in
 from lg_husky_sim.reporting.data import (
@@ -91,8 +93,30 @@ def test_advice_has_the_numbers_and_the_stream() -> None:
         ('sensor_time_offset', 'none'): 'pose'})
     assert 'the left wheels' in robot.sentences[0]
     assert '5 N·m' in robot.sentences[0]
-    assert any('The stamps of the pose' in line and '0.206 s' in line for line in robot.sentences)
+    assert any('The stamps of the pose' in line and '0.206 s late' in line
+               for line in robot.sentences)
+    assert not any('imu_latency' in line for line in simulator.sentences)
     assert 'model:=model.yaml' in simulator.sentences[-1]
+
+
+@pytest.mark.parametrize(('name', 'shapes'), [
+    ('stamp_delay', {('sensor_time_offset', 'none'): 'imu'}), ('imu_late', {})])
+def test_stamps_that_are_early_are_called_early(name: str, shapes: dict[tuple[str, str], str]
+                                                ) -> None:
+    early = _finding('sensor_time_offset', 'none', Estimate(name, -0.24, 's', -0.25, -0.22))
+    diagnosis = _diagnosis(Verdict.KNOWN, early)
+    assert dict(headline(diagnosis).facts)['Size'] == 'stamps 0.24 s early (0.22 to 0.25)'
+    assert 'of the IMU are 0.24 s early' in advice(diagnosis, shapes)[0].sentences[0]
+    if name == 'stamp_delay':
+        said = sentence(Effect('sensor_time_offset', shape='imu'), None, early.parameters,
+                        'everywhere')
+        assert said.startswith('The stamps of the IMU are off: 0.24 s early (0.22 to 0.25).')
+
+
+def test_a_robot_that_is_no_husky_is_given_no_model_to_load() -> None:
+    diagnosis = replace(_diagnosis(Verdict.UNKNOWN, _finding('unknown', 'none')), fits=False)
+    (robot,) = advice(diagnosis, {})
+    assert 'wheels are on the ground' in robot.sentences[0]
 
 
 def test_a_limit_on_the_speed_says_nothing_of_the_yaw_rate() -> None:

@@ -391,7 +391,7 @@ def test_every_effect_says_what_to_do_with_its_own_numbers(name: str) -> None:
     kind = catalogue()[name]
     assert kind.advice.robot
     known = {p.name for p in kind.parameters} | {
-        'side', 'where', 'wheels', 'stream', 'amplitude', 'phase'}
+        'side', 'where', 'wheels', 'stream', 'offset', 'amplitude', 'phase'}
     for sentence in (*kind.advice.robot, *kind.advice.simulator):
         assert {part[1] for part in Formatter().parse(sentence) if part[1]} <= known
         assert sentence.count('`') % 2 == 0
