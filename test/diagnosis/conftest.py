@@ -24,6 +24,8 @@ STEPS = ((1.0, 0.0, 0.0), (2.0, 0.4, 0.0), (2.0, 0.8, 0.0), (2.0, 0.5, 0.6), (2.
          (2.0, -0.5, 0.0), (2.0, -0.6, -0.5), (2.0, 0.0, -0.9), (2.0, 0.7, -0.4),
          (2.0, 0.0, 0.0))
 NOISE = {'wheels': 0.02, 'imu': 0.005, 'pose': 0.003, 'wheel_angles': 0.0}
+#: Part of each step's duration that is long enough to name what is hidden, with its size.
+SHORT = 0.5
 #: What a robot differs in from the nominal model without that anything is missing.
 ROBOT = {'wheel_damping': 1.3, 'yaw_damping': 14.0}
 #: One hidden effect for each part of the robot.
@@ -38,15 +40,17 @@ HIDDEN: Mapping[str, tuple[Effect | None, dict[str, float]]] = {
 }
 
 
-def driven(name: str, hidden: str, seed: int, backwards: bool = False) -> Recording:
-    """Return 19 s of a robot with a hidden effect, sensors noisy."""
+def driven(name: str, hidden: str, seed: int, backwards: bool = False, share: float = 1.0
+           ) -> Recording:
+    """Return a share of 19 s of a robot with a hidden effect, sensors noisy."""
     model = load_model()
     effect, sizes = HIDDEN[hidden]
     structure, parameters = model.structure, model.parameters.replacing(ROBOT)
     if effect is not None:
         structure = structure.with_effect(effect)
         parameters = parameters.with_entries(*entries_of(effect, sizes))
-    steps = STEPS[::-1] if backwards else STEPS
+    steps = [(share * duration, forward, yaw)
+             for duration, forward, yaw in (STEPS[::-1] if backwards else STEPS)]
     return recorded(name, compile_model(structure).at(parameters), steps, seed)
 
 
@@ -85,6 +89,12 @@ def drive() -> Callable[..., Recording]:
 
 
 @pytest.fixture(scope='session')
+def short() -> float:
+    """Return the part of each step's duration in the drives that :func:`diagnosed` has."""
+    return SHORT
+
+
+@pytest.fixture(scope='session')
 def hidden() -> Mapping[str, tuple[Effect | None, dict[str, float]]]:
     """Return what is hidden in the drives, by part."""
     return HIDDEN
@@ -95,6 +105,7 @@ def diagnosed() -> Callable[[str], Case]:
     """Return a function that diagnoses two drives with a hidden effect, once each."""
     @cache
     def made(name: str) -> Case:
-        recordings = [driven('ahead', name, 1), driven('back', name, 2, backwards=True)]
+        recordings = [driven('ahead', name, 1, share=SHORT),
+                      driven('back', name, 2, backwards=True, share=SHORT)]
         return diagnose(recordings, load_model(), lambda text, share: None)
     return made

@@ -32,10 +32,10 @@ PICTURES = {'before_after.png', 'graph.png', 'effort_1.png'}
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory: Any, drive: Callable[..., Recording]) -> Path:
+def folder(tmp_path_factory: Any, drive: Callable[..., Recording], short: float) -> Path:
     """Return the folder of a diagnosis of a bag with a hostile name, made by the command."""
     place: Path = tmp_path_factory.mktemp('diagnosis')
-    made = drive('any', 'rotation', 3)
+    made = drive('any', 'rotation', 3, share=short)
     bag = place / HOSTILE
     write_recording(bag, made.streams, frames=('odom', 'base_link'))
     assert run(['diagnose', str(bag), '--jobs', '1', '--out', str(place / 'out')]) == 0

@@ -41,9 +41,9 @@ def thinned(recording: Recording, stream: str) -> Recording:
 
 
 @pytest.fixture(scope='module')
-def pair(drive: Callable[..., Recording]) -> list[Recording]:
-    """Return two drives with one hidden effect."""
-    return [drive('ahead', ONE, 1), drive('back', ONE, 2, backwards=True)]
+def pair(drive: Callable[..., Recording], short: float) -> list[Recording]:
+    """Return the two drives with one hidden effect that are diagnosed as they are, too."""
+    return [drive('ahead', ONE, 1, share=short), drive('back', ONE, 2, True, short)]
 
 
 @pytest.mark.parametrize('part', PARTS)

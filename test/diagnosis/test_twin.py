@@ -126,7 +126,7 @@ def test_wheels_are_found_by_name(names: list[str], rates: list[float],
 @pytest.mark.realtime
 def test_live_error_drops_with_the_augmented_model(
         drive: Callable[..., Recording], tmp_path: Path) -> None:
-    write_recording(tmp_path / 'bag', drive('any', 'rotation', 4).streams,
+    write_recording(tmp_path / 'bag', drive('any', 'rotation', 4, share=0.5).streams,
                     frames=('odom', 'base_link'))
     model = load_model()
     (entry,) = (p for p in Effect('yaw_scrub_coulomb').parameters()
@@ -173,7 +173,7 @@ def test_live_error_drops_with_the_augmented_model(
 def test_a_signal_ends_what_is_sent_with_one_line(
         drive: Callable[..., Recording], tmp_path: Path, verb: str, number: signal.Signals
         ) -> None:
-    write_recording(tmp_path / 'bag', drive('any', 'rotation', 4).streams,
+    write_recording(tmp_path / 'bag', drive('any', 'rotation', 4, share=0.5).streams,
                     frames=('odom', 'base_link'))
     what = str(tmp_path / 'bag') if verb == 'play' else 'circle'
     with probed_domain() as probe:

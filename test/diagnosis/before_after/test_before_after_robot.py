@@ -6,8 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
+from lg_husky_sim.diagnosis.before_after import diagnose_change
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
 from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT, simulate
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate, chance_of
@@ -96,20 +98,45 @@ def silent(text: str, share: float) -> None:
     """Take progress and say nothing."""
 
 
-def changed(changes: Mapping[str, float], **how: float) -> ChangeCase:
-    """Return what is said of two drives before and two after a change."""
+def said_of(later: Sequence[Recording], before: Sequence[Recording]) -> ChangeCase:
+    """Return what is said; the model that is written is fitted in one step, which says nothing."""
+    known = settings()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(diagnose_change, 'settings',
+                      lambda: replace(known, fit={**known.fit, 'evaluations': 1.0}))
+        return change_case(later, before, load_model(), silent, jobs=2)
+
+
+def changed(changes: Mapping[str, float], steps: int | None = None, **how: float) -> ChangeCase:
+    """Return what is said of two drives before and two after a change, each of so many steps."""
     both = {name: value for name, value in how.items() if name in ('rate', 'low_pass',
                                                                    'accelerometer')}
-    before = [driven('base1', {}, 1, **both), driven('base2', {}, 2, OTHER, **both)]
-    later = [driven('rec1', changes, 3, OTHER, **how), driven('rec2', changes, 4, **how)]
+    one, other = DRIVE[:steps], OTHER[:steps]
+    before = [driven('base1', {}, 1, one, **both), driven('base2', {}, 2, other, **both)]
+    later = [driven('rec1', changes, 3, other, **how), driven('rec2', changes, 4, one, **how)]
+    return said_of(later, before)
+
+
+WORN = {'dry_left': 6.5}
+
+
+def before_and_worn() -> tuple[list[Recording], list[Recording]]:
+    """Return drives of a robot, and of the same with a worn gear."""
+    return ([driven('base1', {}, 1), driven('base2', {}, 2, OTHER)],
+            [driven('rec1', WORN, 3, OTHER), driven('rec2', WORN, 4)])
+
+
+@cache
+def worn() -> ChangeCase:
+    """Return all that is made of these, the model included."""
+    before, later = before_and_worn()
     return change_case(later, before, load_model(), silent, jobs=2)
 
 
 def test_nothing_changed_between_drives_of_one_robot() -> None:
     """Though the sets hold unlike manoeuvres."""
-    case = change_case([driven('rec1', {}, 3, OTHER), driven('rec2', {}, 4, OTHER)],
-                       [driven('base1', {}, 1), driven('base2', {}, 2)], load_model(), silent,
-                       jobs=2)
+    case = said_of([driven('rec1', {}, 3, OTHER), driven('rec2', {}, 4, OTHER)],
+                   [driven('base1', {}, 1), driven('base2', {}, 2)])
     assert case.diagnosis.verdict is Verdict.NOTHING_MISSING
     assert case.diagnosis.findings == ()
 
@@ -117,11 +144,11 @@ def test_nothing_changed_between_drives_of_one_robot() -> None:
 @pytest.mark.parametrize(('changes', 'effect', 'side', 'parameter'), [
     ({'grip_along': 0.45, 'grip_across': 0.36}, 'terrain_change', 'both', 'grip_across'),
     ({'radius_right': 0.1618}, 'wheel_radius_mismatch', 'right', 'radius_right'),
-    ({'dry_left': 6.5}, 'coulomb_drivetrain', 'left', 'dry_left'),
+    (WORN, 'coulomb_drivetrain', 'left', 'dry_left'),
     ({'current_limit': 4.0}, 'current_limit', 'both', 'current_limit')])
 def test_a_change_is_named_with_its_number(changes: Mapping[str, float], effect: str, side: str,
                                            parameter: str) -> None:
-    said = changed(changes).diagnosis
+    said = (worn() if changes == WORN else changed(changes)).diagnosis
     (finding,) = said.findings
     assert (finding.effect, finding.side, finding.onset) == (effect, side, None)
     number = next(one for one in finding.parameters if one.name == parameter)
@@ -137,12 +164,12 @@ VOLTAGES = {'slew_forward': 50.0, 'slew_yaw': 100.0, 'limit_forward': 20.0, 'lim
 
 def test_a_robot_without_a_speed_loop_is_compared_as_well() -> None:
     """It is driven by voltages, as the paper's; a change of its friction has its name."""
-    before = [driven('base1', VOLTAGES, 1), driven('base2', VOLTAGES, 2, OTHER)]
-    same = [driven('rec1', VOLTAGES, 3, OTHER), driven('rec2', VOLTAGES, 4)]
-    assert change_case(same, before, load_model(), silent, jobs=2).diagnosis.findings == ()
-    worn = {**VOLTAGES, 'dry_left': 6.5}
-    case = change_case([driven('rec1', worn, 3, OTHER), driven('rec2', worn, 4)], before,
-                       load_model(), silent, jobs=2)
+    one, other = DRIVE[:7], OTHER[:7]
+    before = [driven('base1', VOLTAGES, 1, one), driven('base2', VOLTAGES, 2, other)]
+    same = [driven('rec1', VOLTAGES, 3, other), driven('rec2', VOLTAGES, 4, one)]
+    assert said_of(same, before).diagnosis.findings == ()
+    changes = {**VOLTAGES, **WORN}
+    case = said_of([driven('rec1', changes, 3, other), driven('rec2', changes, 4, one)], before)
     assert [(f.effect, f.side) for f in case.diagnosis.findings] == [
         ('coulomb_drivetrain', 'left')]
     assert 'speed_loop' not in {e.id for e in case.diagnosis.model.structure.effects}
@@ -180,7 +207,7 @@ def test_a_shift_is_judged_by_what_recordings_differ_by(deviation: float, beyond
     ({'late': 0.06}, 'sensor_time_offset')])
 def test_other_logs_show_the_same(how: Mapping[str, float], effect: str) -> None:
     """Wheel rates at 20 Hz through a low-pass, and no accelerometer."""
-    said = changed({}, rate=20.0, low_pass=0.08, accelerometer=0.0, **how).diagnosis
+    said = changed({}, 5, rate=20.0, low_pass=0.08, accelerometer=0.0, **how).diagnosis
     assert [one.effect for one in said.findings] == [effect]
 
 
@@ -205,10 +232,8 @@ def test_a_change_without_a_name_is_unknown() -> None:
 
 
 def test_the_order_of_recordings_does_not_matter() -> None:
-    before = [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)]
-    later = [driven('rec1', {'com_x': -0.05}, 3, OTHER), driven('rec2', {'com_x': -0.05}, 4)]
-    one, other = (change_case(a, b, load_model(), silent).decision
-                  for a, b in ((later, before), (later[::-1], before[::-1])))
+    before, later = before_and_worn()
+    one, other = worn().decision, said_of(later[::-1], before[::-1]).decision
     assert one.named is not None
     assert other.named is not None
     assert one.named.change == other.named.change
@@ -217,10 +242,7 @@ def test_the_order_of_recordings_does_not_matter() -> None:
 
 
 def test_the_model_that_is_written_drives_like_the_robot_after() -> None:
-    said = change_case([driven('rec1', {'dry_left': 6.5}, 3, OTHER),
-                        driven('rec2', {'dry_left': 6.5}, 4)],
-                       [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)],
-                       load_model(), silent).diagnosis
+    said = worn().diagnosis
     assert said.augmented['wheel_speed_rmse'] < said.plain['wheel_speed_rmse']
     assert {'speed_loop', 'command_latency'} <= {e.id for e in said.model.structure.effects}
     assert said.mismatch[0].subsystem == 'drivetrain'
