@@ -34,8 +34,11 @@ def test_notebook_runs_and_shows_results(
     # Not the kernel of that name that some other environment may have installed.
     manager = KernelManager(kernel_name='python3')
     manager.kernel_spec.argv[0] = sys.executable  # type: ignore[union-attr]
-    NotebookClient(notebook, km=manager, timeout=PATIENCE,
-                   resources={'metadata': {'path': str(tmp_path)}}).execute()
+    try:
+        NotebookClient(notebook, km=manager, timeout=PATIENCE,
+                       resources={'metadata': {'path': str(tmp_path)}}).execute()
+    finally:
+        manager.shutdown_kernel(now=True)
     shown = [output for cell in notebook.cells if cell.cell_type == 'code'
              for output in cell.outputs if output.output_type in ('execute_result',
                                                                   'display_data')]
