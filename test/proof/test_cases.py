@@ -64,7 +64,7 @@ def answer_of(folder: Path) -> dict[str, Any]:
 
 
 SLOPE = Spec(42, 'single', effects=('slope',), severity='strong', onset='place', drive='joystick',
-             wheels='difference', floor='smooth', seconds=(20.0, 21.0), complete=True)
+             wheels='difference', floor='smooth', seconds=(10.0, 11.0), complete=True)
 
 
 @pytest.fixture(scope='module')
@@ -131,7 +131,7 @@ def test_held_out_truth_fits_its_recording_within_noise(single: Path) -> None:
 
 def test_a_robot_that_changed_comes_with_recordings_of_before(tmp_path: Path) -> None:
     make(tmp_path, Spec(7, 'single', 'g3', effects=('payload',), severity='strong',
-                        seconds=(20.0, 21.0)))
+                        seconds=(10.0, 11.0)))
     for part in ('before', 'after'):
         names = sorted(path.name for path in (tmp_path / 'cases/case_0001' / part).iterdir())
         assert names == ['rec1', 'rec2', 'rec3']

@@ -19,7 +19,7 @@ from lg_husky_sim.proof.cases import Spec
 from lg_husky_sim.proof.scoring import judge
 import pytest
 
-SHORT = (20.0, 21.0)
+SHORT = (10.0, 11.0)
 SPECS = (Spec(3, 'clean', wheels='difference', floor='smooth', seconds=SHORT, complete=True),
          Spec(4, 'single', effects=('rolling_resistance',), severity='strong', onset='none',
               wheels='difference', floor='smooth', seconds=SHORT, complete=True))
@@ -106,7 +106,7 @@ def test_what_the_drives_cannot_show_is_drawn_again(tmp_path: Path) -> None:
     folders = trial.Folders(tmp_path)
     # The paper's circle never reverses.
     spec = Spec(1, 'outside', drive='paper', effects=('reverse_gain',), severity='medium',
-                seconds=SHORT)
+                seconds=(20.0, 21.0))
     (name,) = trial.prepare(folders, (spec,), 1, lambda _: None, held_out=False)
     answer = json.loads((folders.answers / f'{name}.json').read_text())
     assert answer['spec']['seed'] != 1
