@@ -25,7 +25,8 @@ CLOCKED = ('test/ros', 'test/diagnosis/test_twin.py')
 """Where ./check looks for tests that look at the clock, lest it imports all others once more."""
 
 LONGEST = ('test_tour.py', 'test_before_after_robot.py', 'test_diagnosis_names.py',
-           'test_notebooks.py', 'test_api.py', 'test_evaluation_paper.py')
+           'test_diagnosis_files.py', 'test_notebooks.py', 'test_api.py',
+           'test_evaluation_paper.py')
 """Files whose tests take longest: begun first, so that no process waits for another's last one."""
 
 

@@ -177,7 +177,7 @@ def test_a_robot_without_a_speed_loop_is_compared_as_well() -> None:
 
 def test_a_gyro_is_judged_by_the_pose_and_not_by_the_model() -> None:
     """Its factor is found to half a percent though nothing says how the robot turns."""
-    case = changed({'grip_along': 0.45, 'grip_across': 0.36}, factor=0.93)
+    case = changed({'grip_along': 0.45, 'grip_across': 0.36}, 7, factor=0.93)
     assert case.body is not None
     after = dict(zip(case.body.base.names, case.body.base.values(case.body.after), strict=True))
     assert after['gyro_factor'] == pytest.approx(0.93, abs=0.005)
