@@ -25,7 +25,7 @@ pytest.importorskip('matplotlib')
 @pytest.fixture(scope='module')
 def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp('evaluation') / 'out'
-    assert run(['evaluate', '--out', str(out), '--case', 'synthetic']) == 0
+    assert run(['evaluate', '--out', str(out), '--case', 'synthetic', '--starts', '2']) == 0
     return out
 
 
@@ -74,7 +74,7 @@ def test_recordings_are_evaluated_with_a_rival(tmp_path: Path, evaluated: Path,
     out = tmp_path / 'out'
     assert run(['evaluate', '--out', str(out), '--calibrate', str(tmp_path / 'circle'),
                 '--held-out', str(tmp_path / 's_bend'), '--rival', str(tmp_path / 'circle_rival'),
-                '--rival', str(tmp_path / 's_bend_rival')]) == 0
+                '--rival', str(tmp_path / 's_bend_rival'), '--starts', '1']) == 0
     (case,) = json.loads((out / 'evaluation.json').read_text())['cases']
     held = case['tracking_error'][1]
     assert held['manoeuvre'] == 's_bend'
