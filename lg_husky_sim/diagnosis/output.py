@@ -10,12 +10,13 @@ from pathlib import Path
 from lg_husky_sim.diagnosis.before_after.diagnose_change import ChangeCase
 from lg_husky_sim.diagnosis.before_after.report import change_report
 from lg_husky_sim.diagnosis.diagnose import Case
+from lg_husky_sim.diagnosis.report import headline as page_headline
 from lg_husky_sim.diagnosis.report import unnamed
 from lg_husky_sim.diagnosis.report_of_case import case_report
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Verdict
 from lg_husky_sim.husky.model_file import save_model
 from lg_husky_sim.reporting.data import Provenance, RECALIBRATED, WITH_FINDING
-from lg_husky_sim.reporting.words import plural, quantity_with_unit
+from lg_husky_sim.reporting.words import quantity_with_unit
 from lg_husky_sim.reporting.write import write_report
 
 #: File that marks a folder of this kind.
@@ -38,8 +39,7 @@ def headline(diagnosis: Diagnosis, changed: bool = False) -> str:
             return ('Something has changed that is not in the catalogue.' if changed else
                     'Something is missing that is not in the catalogue.')
         case Verdict.KNOWN:
-            count = plural(len(diagnosis.findings), 'change' if changed else 'missing effect')
-            return f'{count} found.'
+            return f'{page_headline(diagnosis, changed=changed).text}.'
 
 
 def error_table(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:

@@ -10,7 +10,7 @@ import math
 from lg_husky_sim.diagnosis.before_after.settings import settings as before_after
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.diagnosis.wording import LATENESS, lateness_words
+from lg_husky_sim.diagnosis.wording import LATENESS, lateness_words, PHASE, sized
 from lg_husky_sim.husky.effects import catalogue, effect_kind, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.data import (
@@ -33,37 +33,8 @@ from lg_husky_sim.reporting.words import capitalised, change, number, plural, wi
 _STREAMS = {'wheels': 'the wheels (`/joint_states`)', 'imu': 'the IMU',
             'pose': 'the pose (`/tf`, odometry)'}
 _WHEELS = {'left': 'the left wheels', 'right': 'the right wheels'}
-_AMPLITUDE, _PHASE = 'amplitude', 'phase'
 #: Signals of the page by the channels of a diagnosis that are rates of the pose.
 _SIGNALS = {'advance': 'forward', 'turn': 'yaw_rate'}
-
-
-def sizes(finding: Finding) -> tuple[Estimate, ...]:
-    """
-    Return the numbers of a finding; cosine and sine of a ripple as amplitude and phase.
-
-    Parameters
-    ----------
-    finding : Finding
-
-    Returns
-    -------
-    tuple of Estimate
-        Intervals of amplitude and phase by propagation, cosine and sine taken as independent.
-    """
-    known = {one.name: one for one in finding.parameters}
-    cosine, sine = known.get('ripple_cos'), known.get('ripple_sin')
-    if cosine is None or sine is None:
-        return finding.parameters
-    size = math.hypot(cosine.value, sine.value)
-    half = [0.5 * (one.high - one.low) for one in (cosine, sine)]
-    parts = (cosine.value / size, sine.value / size) if size else (1.0, 0.0)
-    wide = math.hypot(parts[0] * half[0], parts[1] * half[1])
-    turn = math.hypot(parts[1] * half[0], parts[0] * half[1]) / size if size else math.pi
-    angle = math.atan2(sine.value, cosine.value)
-    return (Estimate(_AMPLITUDE, size, cosine.unit, max(0.0, size - wide), size + wide),
-            Estimate(_PHASE, angle, 'rad', angle - turn, angle + turn),
-            *(one for one in finding.parameters if one not in (cosine, sine)))
 
 
 def effect_words(finding: Finding) -> str:
@@ -141,7 +112,8 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
 
 def _facts(finding: Finding, several: bool, changed: bool) -> tuple[tuple[str, str], ...]:
     # The phase of a ripple says where on the wheel, not how large.
-    words = '; '.join(size_words(one) for one in sizes(finding) if one.name != _PHASE) or '–'
+    words = '; '.join(size_words(one) for one in sized(finding.parameters)
+                      if one.name != PHASE) or '–'
     if several:
         return ((f'Size of {effect_words(finding)}', words),)
     kind = catalogue().get(finding.effect)
@@ -214,7 +186,7 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
             robot.append('Check the part of the robot that the report names, at the times that it '
                          'lists: no effect of the catalogue behaves like this.')
             continue
-        values: dict[str, float | str] = {one.name: one.value for one in sizes(finding)}
+        values: dict[str, float | str] = {one.name: one.value for one in sized(finding.parameters)}
         values |= {'side': finding.side, 'where': 'both sides', 'wheels': 'the wheels'}
         if finding.side in _WHEELS:
             values |= {'where': f'{finding.side} side', 'wheels': _WHEELS[finding.side]}
@@ -297,7 +269,7 @@ def found_numbers(diagnosis: Diagnosis) -> tuple[Section, ...]:
             continue
         rows += [(effect_words(finding), one.name.replace('_', ' '), number(one.value, 4),
                   f'{number(one.low, 4)} to {number(one.high, 4)}',
-                  '' if one.unit == '1' else one.unit) for one in sizes(finding)]
+                  '' if one.unit == '1' else one.unit) for one in sized(finding.parameters)]
         place = f'Elements of the graph: {", ".join(finding.elements)}. ' if (
             finding.elements) else ''
         points.append(f'{capitalised(effect_words(finding))} ({finding.subsystem}): shows '
@@ -354,9 +326,9 @@ def report_data(
              if not diagnosis.fits else
              'refitted with a smooth description of what is missing'}
     remains = diagnosis.remaining if diagnosis.fits else ''
-    notes = (*(f'Sensors against each other: {text}.' for text in unnamed(diagnosis)),
-             *(f'{capitalised(one)}.' for one in diagnosis.notes),
-             *((f'What remains: {remains}.',) if remains else ()))
+    notes = (*(f'sensors against each other: {text}' for text in unnamed(diagnosis)),
+             *diagnosis.notes,
+             *((f'what remains: {remains}',) if remains else ()))
     warnings = (*losses(errors), *(implausible(parameters) if diagnosis.fits else ()))
     return ReportData(
         f'{"What changed in " if changed else "Diagnosis of "}{", ".join(recordings)}',
@@ -369,5 +341,6 @@ def report_data(
         tuple(parameters),
         sections=(*found_numbers(diagnosis), *competing(diagnosis), *sections), notes=notes,
         files=(('model.yaml', f'is the {_which(diagnosis)}'),
-               ('plain.yaml', 'is the recalibrated model with nothing added'),
+               ('plain.yaml', 'is the model of the earlier recordings' if changed else
+                'is the recalibrated model with nothing added'),
                ('diagnosis.json', 'has all numbers')), provenance=provenance or Provenance())

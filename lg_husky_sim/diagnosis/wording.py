@@ -9,9 +9,11 @@ import math
 
 from lg_husky_sim.diagnosis.result import Estimate
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.reporting.words import number, with_unit
 
 _STREAMS = {'wheels': 'of the wheels (joint states)', 'imu': 'of the IMU',
             'pose': 'of the pose (tf or odometry)'}
+AMPLITUDE, PHASE = 'amplitude', 'phase'
 #: The number of an effect that says how late stamps are, or how early.
 LATENESS = 'stamp_delay'
 
@@ -27,20 +29,48 @@ def onset_words(onset: Onset | None) -> str:
     return f', where x is {side} {onset.value:.2f} m'
 
 
+def sized(numbers: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """
+    Return the numbers of a finding; cosine and sine of a ripple as amplitude and phase.
+
+    Parameters
+    ----------
+    numbers : sequence of Estimate
+
+    Returns
+    -------
+    tuple of Estimate
+        Intervals of amplitude and phase by propagation, cosine and sine taken as independent.
+    """
+    known = {one.name: one for one in numbers}
+    cosine, sine = known.get('ripple_cos'), known.get('ripple_sin')
+    if cosine is None or sine is None:
+        return tuple(numbers)
+    size = math.hypot(cosine.value, sine.value)
+    half = [0.5 * (one.high - one.low) for one in (cosine, sine)]
+    parts = (cosine.value / size, sine.value / size) if size else (1.0, 0.0)
+    wide = math.hypot(parts[0] * half[0], parts[1] * half[1])
+    turn = math.hypot(parts[1] * half[0], parts[0] * half[1]) / size if size else math.pi
+    angle = math.atan2(sine.value, cosine.value)
+    return (Estimate(AMPLITUDE, size, cosine.unit, max(0.0, size - wide), size + wide),
+            Estimate(PHASE, angle, 'rad', angle - turn, angle + turn),
+            *(one for one in numbers if one not in (cosine, sine)))
+
+
 def in_words(numbers: Sequence[Estimate]) -> str:
     """Return estimates as text with their intervals."""
     return ', '.join(
         lateness_words(e) if e.name == LATENESS else
-        f'{e.name.replace("_", " ")} {e.value:.3g}{"" if e.unit == "1" else " " + e.unit} '
-        f'({e.low:.3g} to {e.high:.3g})' for e in numbers)
+        f'{e.name.replace("_", " ")} {with_unit(e.value, e.unit)} '
+        f'({number(e.low)} to {number(e.high)})' for e in sized(numbers))
 
 
-def lateness_words(late: Estimate, digits: int = 3) -> str:
+def lateness_words(late: Estimate) -> str:
     """Return how late or early stamps are, such as ``0.24 s early (0.22 to 0.25)``."""
     sign = math.copysign(1.0, late.value)
     low, high = sorted((sign * late.low, sign * late.high))
-    return (f'{abs(late.value):.{digits}g} {late.unit} {"late" if sign > 0.0 else "early"} '
-            f'({low:.{digits}g} to {high:.{digits}g})')
+    return (f'{with_unit(abs(late.value), late.unit)} {"late" if sign > 0.0 else "early"} '
+            f'({number(low)} to {number(high)})')
 
 
 def effect_words(effect: Effect) -> str:

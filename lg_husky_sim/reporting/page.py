@@ -103,7 +103,9 @@ def _change_cell(known: Mapping[str, float], compared: tuple[str, str], low: flo
     before, after = (known.get(name, math.nan) for name in compared)
     words = change(before, after)
     if math.isfinite(low) and math.isfinite(high):
-        words += f' ({change(1.0, low)} to {change(1.0, high)})'
+        # Kept on one line, however narrow the screen.
+        ends = f'({change(1.0, low)} to {change(1.0, high)})'
+        words += ' ' + ends.replace('\u00a0% to ', ' to ').replace(' ', '\u00a0')
     # A change that is rounded away, or whose interval includes none, is neither.
     if not (math.isfinite(before) and math.isfinite(after)) or low < 1.0 < high or (
             abs(after - before) < 0.005 * before):
@@ -155,6 +157,13 @@ def jumps_of(data: ReportData) -> dict[int, int]:
     return dict(enumerate(able))
 
 
+def said(text: str) -> str:
+    """Return a remark as a sentence: a large letter first, a full stop last."""
+    if text.split(' ')[0].isalpha():  # else a name, of a recording for one, which stays as it is
+        text = capitalised(text)
+    return text if text.endswith(('.', '!', '?', ':')) else f'{text}.'
+
+
 def view_caption(data: ReportData, view: View) -> str:
     """Return what the first picture of a page shows."""
     words = ', '.join((MEASURED, *data.columns))
@@ -189,7 +198,8 @@ def page(data: ReportData, view: View | None, images: Mapping[str, bytes],
     environment = Environment(
         loader=PackageLoader('lg_husky_sim.reporting', '.'), autoescape=True,
         trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(code=code, errors=error_cells, quantity=quantity, worded=worded)
+    environment.filters.update(code=code, errors=error_cells, quantity=quantity,
+                               said=said, worded=worded)
     own = files('lg_husky_sim.reporting')
     jumps = jumps_of(data)
     listed = data.mismatches[:MOST_MISMATCHES]

@@ -8,9 +8,9 @@ from dataclasses import replace
 import math
 
 from lg_husky_sim.diagnosis.before_after.settings import settings
-from lg_husky_sim.diagnosis.report import advice, headline, implausible, losses, sizes
+from lg_husky_sim.diagnosis.report import advice, headline, implausible, losses
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
-from lg_husky_sim.diagnosis.wording import sentence
+from lg_husky_sim.diagnosis.wording import sentence, sized
 from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.reporting.advice import names_in
@@ -40,7 +40,7 @@ RIPPLE = _finding('torque_ripple', 'left', Estimate('ripple_cos', 3.0, 'N·m', 2
 
 
 def test_a_ripple_has_amplitude_and_phase() -> None:
-    amplitude, phase = sizes(RIPPLE)
+    amplitude, phase = sized(RIPPLE.parameters)
     assert (amplitude.name, amplitude.value, amplitude.unit) == ('amplitude', 5.0, 'N·m')
     assert (amplitude.low, amplitude.high) == pytest.approx((4.8, 5.2))
     assert phase.value == pytest.approx(math.atan2(-4.0, 3.0))

@@ -26,7 +26,7 @@ from lg_husky_sim.reporting.data import (
     Trace,
     WITH_FINDING,
 )
-from lg_husky_sim.reporting.page import code, error_cells, parameter_rows
+from lg_husky_sim.reporting.page import code, error_cells, parameter_rows, said
 from lg_husky_sim.reporting.sections import Cell, Drawing, Section, Tone
 from lg_husky_sim.reporting.write import write_report
 import numpy as np
@@ -138,6 +138,11 @@ def test_a_picture_that_fails_is_a_line_of_the_report(tmp_path: Path) -> None:
     assert not (tmp_path / 'graph.png').exists()
 
 
+def test_remarks_are_sentences_and_names_stay_as_they_are() -> None:
+    assert said('residuals are autocorrelated') == 'Residuals are autocorrelated.'
+    assert said('rec1: 3 samples were dropped.') == 'rec1: 3 samples were dropped.'
+
+
 def _changes(table: ErrorTable) -> list[tuple[str, Tone]]:
     cells = [row[-1] for row in error_cells(table).rows]
     return [(cell.text, cell.tone) for cell in cells if isinstance(cell, Cell)]
@@ -153,7 +158,7 @@ def test_a_loss_is_as_visible_as_a_gain() -> None:
     ), COLUMNS, compared=(RECALIBRATED, WITH_FINDING))
     assert _changes(table) == [
         ('+100\u00a0% worse', Tone.BAD), ('−50\u00a0%', Tone.GOOD), ('+0\u00a0%', Tone.PLAIN),
-        ('+5\u00a0% (−10\u00a0% to +20\u00a0%)', Tone.PLAIN), ('+0\u00a0%', Tone.PLAIN)]
+        ('+5\u00a0% (−10\u00a0to\u00a0+20\u00a0%)', Tone.PLAIN), ('+0\u00a0%', Tone.PLAIN)]
 
 
 def test_models_side_by_side_have_their_best_marked() -> None:
