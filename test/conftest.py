@@ -42,7 +42,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if item.path.name in REALTIME:
             item.add_marker(pytest.mark.realtime)
         if item.get_closest_marker('realtime') and not any(
-                item.path.is_relative_to(ROOT / place) for place in CLOCKED):
+                item.path.resolve().is_relative_to(ROOT / place) for place in CLOCKED):
             raise pytest.UsageError(f'{item.nodeid} looks at the clock, and ./check only has such '
                                     f'tests in {", ".join(CLOCKED)}')
     items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST
