@@ -88,6 +88,8 @@ class Law(enum.IntEnum):
     p0 at most, until z1 moves; p2 is 0 or 1 (left or right axle), 2 or 3 (tyres there)."""
     YIELDING = 18
     """f = sgn(z0) max(|z0| - p0, 0)/p1: rate at which what holds p0 slips under a torque z0."""
+    SOFT_BAND = 19
+    """f = -z0 exp(-(z0/p0)^2): little passes below p0 and all well above."""
 
 
 #: The laws as expressions of the linear graph: arguments z1, z2, ..., coefficients p0, p1, ...
@@ -111,6 +113,7 @@ EXPRESSIONS = {
     Law.TABLE: 'table',
     Law.FRICTION_CIRCLE: (
         '(1/(1+(((p1*z1)**2+(p2*z2)**2)/p0**2)**1.5)**0.3333333333333333-1)*p1*z1'),
+    Law.SOFT_BAND: '-z1*exp(-(z1/p0)**2)',
     Law.YIELDING: '(2*z1+abs(z1-p0)-abs(z1+p0))/(2*p1)',
     Law.STICTION: (
         '-p0/p1*(held+p4*z1*(exp(-2*(z2/p3)**2)-(held/p1)**2'
@@ -163,6 +166,8 @@ def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int
         return math.copysign(max(abs(own) - p0, 0.0), own) - own
     if law == 9:
         return -own * 0.5 * (1.0 - math.tanh((abs(own) - p0) / p1))
+    if law == 19:
+        return -own * math.exp(-(own / p0) ** 2) if p0 > 0.0 else 0.0
     if law == 10:
         return _clip(own, -p0, p0) - own
     if law == 11:

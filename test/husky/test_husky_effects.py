@@ -109,6 +109,7 @@ NEUTRAL: list[tuple[Effect, dict[str, float]]] = [
     (Effect('current_limit'), {'current_limit': 200.0}),
     (Effect('driver_deadband', shape='zone'), {'dead_voltage': 0.0}),
     (Effect('driver_deadband', shape='band'), {'dead_voltage': 0.0, 'dead_edge': 0.001}),
+    (Effect('driver_deadband', shape='soft'), {'dead_voltage': 0.0}),
     (Effect('voltage_saturation'), {'clip_voltage': 24.0}),
     (Effect('motor_heating'), {'heating_rate': 0.0}),
     (Effect('command_latency'), {'latency': 0.0}),

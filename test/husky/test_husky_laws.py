@@ -16,7 +16,7 @@ import pytest
 COEFFICIENTS = {
     Law.COULOMB: 4, Law.QUADRATIC: 1, Law.WHILE_MOVING: 2, Law.MODULATED_DAMPING: 1,
     Law.HEADING: 2, Law.WHEEL_PHASE: 4, Law.SLIP_SATURATION: 2, Law.CURRENT_LIMIT: 3,
-    Law.DEAD_ZONE: 1, Law.DEAD_BAND: 2, Law.CLIP: 1, Law.BUS_SAG: 2, Law.DROOP: 2,
+    Law.DEAD_ZONE: 1, Law.DEAD_BAND: 2, Law.SOFT_BAND: 1, Law.CLIP: 1, Law.BUS_SAG: 2, Law.DROOP: 2,
     Law.HEATING: 3, Law.BACKLASH: 3, Law.FRICTION_CIRCLE: 3, Law.STICTION: 5,
     Law.YIELDING: 2,
 }
@@ -104,6 +104,8 @@ def test_voltage_laws() -> None:
             math.copysign(max(abs(volts) - 2.0, 0.0), volts))
         assert reached(Law.DEAD_BAND, [2.0, 0.05], volts) == pytest.approx(
             volts if abs(volts) > 2.0 else 0.0, abs=1e-12)
+    assert reached(Law.SOFT_BAND, [2.0], 2.0) == pytest.approx(2.0 - 2.0 / math.e)
+    assert reached(Law.SOFT_BAND, [2.0], -15.0) == pytest.approx(-15.0)
 
 
 def test_bus_sag_is_the_drop_of_what_both_bridges_draw() -> None:

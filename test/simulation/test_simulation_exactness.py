@@ -139,6 +139,7 @@ def test_efforts_agree_with_scipy(robot: Maker, effect: str) -> None:
     ('voltage_saturation', {'clip_voltage': 8.0}),
     (Effect('driver_deadband', shape='zone'), {'dead_voltage': 2.0}),
     (Effect('driver_deadband', shape='band'), {'dead_voltage': 6.0}),
+    (Effect('driver_deadband', shape='soft'), {'dead_voltage': 3.0}),
 ])
 def test_efforts_of_the_voltage_alone_are_as_exact_as_the_linear_plant(
         robot: Maker, effect: str | Effect, values: dict[str, float]) -> None:

@@ -9,15 +9,15 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.before_after.drives import Drive
-from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic, Solution
+from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.expansion import Expansion, joined, quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import cost_at, fit_set, Prior
+from lg_husky_sim.diagnosis.before_after.judge import Judge
 from lg_husky_sim.diagnosis.before_after.prediction import Base, residual
 from lg_husky_sim.diagnosis.before_after.settings import Change
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise, Noise, noise_of
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from scipy.stats import f as fisher
 
 #: Told how far it is (0 to 1).
 Share = Callable[[float], None]
@@ -107,27 +107,39 @@ def compare(base: Base, before: Sequence[Drive], after: Sequence[Drive], begin: 
     quantities = base.settings.quantities
     free = np.array([not base.given or q.name in base.settings.body for q in quantities])
     prior = Prior(base.start, base.sd, free)
-    steps, enough = int(numbers['steps']), numbers['enough']
+    steps, roughly, enough = int(numbers['steps']), numbers['roughly'], numbers['enough']
     noise = first_noise(base.settings)
     earlier = _begun(base, before, prior, noise, begin, pool)
-    share(0.35)
+    share(0.25)
     later = _started(base, after, prior, noise, earlier, pool)
-    later = fit_set(base, after, prior, noise, later, steps, numbers['roughly'], pool).z
-    share(0.6)
-    for last in (False, True):
-        noise = noise_of([residual(base, d, z) for ds, z in ((before, earlier), (after, later))
-                          for d in ds], int(numbers['filter']))
-        if not last:
-            earlier = fit_set(base, before, prior, noise, earlier, steps, enough, pool).z
-            share(0.75)
-            later = fit_set(base, after, prior, noise, later, steps, enough, pool).z
-            share(0.9)
+    later = fit_set(base, after, prior, noise, later, steps, roughly, pool).z
+    share(0.4)
+
+    def renewed() -> Noise:
+        return noise_of([residual(base, d, z) for ds, z in ((before, earlier), (after, later))
+                         for d in ds], int(numbers['filter']))
+    noise = renewed()
+    sets = [fit_set(base, before, prior, noise, earlier, steps, enough, pool)]
+    share(0.55)
+    sets.append(fit_set(base, after, prior, noise, later, steps, enough, pool))
+    share(0.7)
+    # Each set's likelihood has more than one summit, that of all recordings fewer: what fits all
+    # is where the sets' fits begin again.
+    every = (*before, *after)
+    common = min((fit_set(base, every, prior, noise, fit.z, steps, roughly, pool)
+                  for fit in sets), key=lambda fit: fit.cost).z
+    share(0.85)
+    earlier, later = (min(fit, fit_set(base, drives, prior, noise, common, steps, enough, pool),
+                          key=lambda one: one.cost).z
+                      for fit, drives in zip(sets, (before, after), strict=True))
+    noise = renewed()
     quadratics = [*_quadratics(base, before, noise, earlier, later, prior, pool, False),
                   *_quadratics(base, after, noise, later, earlier, prior, pool, True)]
+    share(0.9)
+    found = _candidates(base, prior, quadratics, Expansion(
+        base, prior, noise, every, (earlier, later, common), pool))
     share(1.0)
-    return Block(base, earlier, later, noise, *_candidates(
-        base, prior, quadratics, Expansion(
-            base, prior, noise, (*before, *after), (earlier, later), pool)))
+    return Block(base, earlier, later, noise, *found)
 
 
 def _begun(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, begin: FloatArray,
@@ -142,7 +154,7 @@ def _begun(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, begi
 def _kinds(base: Base, prior: Prior, begin: FloatArray) -> list[FloatArray]:
     # Where the kinds of robot are the same for this block, once.
     names, found = base.names, [begin]
-    for kind in base.settings.kinds:
+    for kind in base.kinds:
         start = np.array(begin)
         for name, value in kind.items():
             k = names.index(name)
@@ -210,59 +222,25 @@ def _candidates(base: Base, prior: Prior, quadratics: Sequence[Quadratic],
                         np.array([quantities[k].recording for k in index]),
                         np.array([quantities[k].change for k in index])).estimated(
                             weight, int(numbers['recording_rounds']))
-    freedom = max(weight + len(reduced) - 2.0, 1.0)
-    # Delays of all streams are none: that of the reference is left out where all may differ.
-    everything = np.array([i for i, k in enumerate(index) if k != base.reference], dtype=np.intp)
-    changes = [(c, names, np.array([place[name] for name in names], dtype=np.intp))
-               for c in base.settings.changes if c.block == 'body' or not base.given
-               for names in [c.parameters if base.given else (*c.parameters, *c.more)]]
-    solutions = [evidence.solve(changed) for _, _, changed in changes]
-    whole = evidence.solve(everything)
-    nothing = evidence.solve(np.zeros(0, dtype=np.intp)).evidence
-    rate = base.settings.decision['false_alarm_rate']
+    judge = Judge(evidence, expansion, max(weight + len(reduced) - 2.0, 1.0),
+                  base.settings.decision)
     count = sum(c.block == shown for c in base.settings.changes)
-
-    def claimed(solved: Solution, tries: int, less: float) -> bool:
-        return (solved.evidence - nothing > less
-                and tries * chance_of(solved, freedom, less) < rate)
-    less = less_whole = 0.0
-    if claimed(whole, 1, 0.0) or any(claimed(solved, count, 0.0) for solved in solutions):
-        # Far from the sets' fits the expansions about these are not to be trusted.
-        less = less_whole = max(expansion.evidence(
-            evidence, np.zeros(0, dtype=np.intp)) - nothing, 0.0)
-        if claimed(whole, 1, less):
-            less_whole += max(whole.evidence - expansion.evidence(evidence, everything), 0.0)
-    found = [Candidate(c, names, solved.evidence - nothing - less, solved.shared[changed],
-                       solved.shift, np.sqrt(np.diag(solved.covariance)),
-                       min(1.0, count * chance_of(solved, freedom, less)))
-             for (c, names, changed), solved in zip(changes, solutions, strict=True)]
+    changes = [(c, c.parameters if base.given else (*c.parameters, *c.more))
+               for c in base.settings.changes if c.block == 'body' or not base.given]
+    claims = [judge.claim(np.array([place[name] for name in names], dtype=np.intp), count)
+              for _, names in changes]
+    # Delays of all streams are none: that of the reference is left out where all may differ.
+    whole = judge.checked([judge.claim(np.array(
+        [i for i, k in enumerate(index) if k != base.reference], dtype=np.intp), 1)])[0]
+    own = iter(judge.checked([claim for claim, (c, _) in zip(claims, changes, strict=True)
+                              if c.block == shown]))
+    found = []
+    for (change, names), claim in zip(changes, claims, strict=True):
+        sure = next(own) if change.block == shown else judge.about_nothing(claim)
+        solved = sure.solution
+        found.append(Candidate(change, names, sure.gain, solved.shared[claim.changed],
+                               solved.shift, np.sqrt(np.diag(solved.covariance)), sure.chance))
     found.sort(key=lambda one: -one.gain)
     return (tuple(one for one in found if one.change.block == shown),
             tuple(one for one in found if one.change.block != shown),
-            whole.evidence - nothing - less_whole, chance_of(whole, freedom, less_whole))
-
-
-def chance_of(solved: Solution, freedom: float, less: float = 0.0) -> float:
-    """
-    Return how probable so large a shift is where nothing has changed.
-
-    The deviations from recording to recording are themselves estimated, so that the shift d of k
-    parameters with covariance C is judged by Fisher's distribution::
-
-        P(F(k, freedom) > (d' C^-1 d - 2 less) / k)
-
-    Parameters
-    ----------
-    solved : Solution
-    freedom : float
-        Degrees of freedom of the deviations.
-    less : float
-        What the expansions say too much [nats].
-
-    Returns
-    -------
-    float
-    """
-    size = solved.shift.size
-    square = float(solved.shift @ np.linalg.solve(solved.covariance, solved.shift)) - 2.0 * less
-    return float(fisher.sf(square / size, size, freedom))
+            whole.gain, whole.chance)

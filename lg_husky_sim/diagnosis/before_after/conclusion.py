@@ -57,8 +57,7 @@ def statement(one: Candidate, settings: Settings) -> str:
     return f'{one.change.title[0].upper()}{one.change.title[1:]}: {"; ".join(parts)}.'
 
 
-def finding(decision: Decision, settings: Settings, p_value: float, share: float
-            ) -> Finding | None:
+def finding(decision: Decision, settings: Settings, share: float) -> Finding | None:
     """Return what is named as a finding."""
     named = decision.named
     rivals = tuple(Rivalry(one.change.effect, one.change.side, one.gain)
@@ -67,7 +66,7 @@ def finding(decision: Decision, settings: Settings, p_value: float, share: float
         near = decision.rivals[0].change if decision.rivals else None
         return Finding('unknown', 'none', near.subsystem if near else 'drivetrain',
                        near.elements if near else (), near.regime if near else '', None, (),
-                       decision.unnamed, p_value, share, rivals,
+                       decision.unnamed, decision.chance, share, rivals,
                        'Something has changed that is none of the known changes: the later '
                        'recordings need other parameters than the earlier ones.')
     if named is None:
@@ -77,7 +76,7 @@ def finding(decision: Decision, settings: Settings, p_value: float, share: float
                 1.0)
     effect = 'gyro_sign' if sign < 0.0 else change.effect
     return Finding(effect, change.side, change.subsystem, change.elements, change.regime,
-                   None, estimates(named, settings), named.gain, p_value, share, rivals,
+                   None, estimates(named, settings), named.gain, decision.chance, share, rivals,
                    statement(named, settings))
 
 

@@ -28,6 +28,8 @@ class Decision:
     confidence : float
     unnamed : float
         Gain of letting everything differ where something changed that has no name [nats]; else 0.
+    chance : float
+        Of what is claimed, on a robot that has not changed; NaN where nothing changed.
     """
 
     named: Candidate | None
@@ -35,6 +37,7 @@ class Decision:
     tied: tuple[str, ...]
     confidence: float
     unnamed: float = 0.0
+    chance: float = float('nan')
 
 
 def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], whole: Sequence[Candidate],
@@ -98,14 +101,15 @@ def _simplest(candidates: Sequence[Candidate], numbers: Mapping[str, float]) -> 
     return min(equal, key=lambda one: len(one.change.parameters), default=best)
 
 
-def decide(body: Block | None, loop: Block | None, settings: Settings) -> Decision:
+def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
     """
     Decide from what both blocks say.
 
     Parameters
     ----------
-    body, loop : Block or None
+    body : Block or None
         None where the recordings lack what it takes.
+    loop : Block
     settings : Settings
 
     Returns
@@ -114,13 +118,13 @@ def decide(body: Block | None, loop: Block | None, settings: Settings) -> Decisi
     """
     numbers = settings.decision
     bodily = () if body is None else body.candidates
-    looped = () if loop is None else loop.candidates
-    named = named_by(bodily, looped, () if loop is None else loop.others, numbers)
+    looped = loop.candidates
+    named = named_by(bodily, looped, loop.others, numbers)
     everything = sorted((*bodily, *looped), key=lambda one: -one.gain)
     blocks = [block for block in (body, loop) if block is not None]
     surest = min(blocks, key=lambda block: block.chance if block.anything > 0.0 else 1.0)
     gained = 0.0 if named is None else max(
-        one.gain for one in (named, *(() if loop is None else loop.others))
+        one.gain for one in (named, *loop.others)
         if one.change is named.change)
     rate = numbers['false_alarm_rate']
     if surest.anything > 0.0 and surest.chance < rate and (
@@ -128,7 +132,7 @@ def decide(body: Block | None, loop: Block | None, settings: Settings) -> Decisi
         margin = 1.0 - gained / surest.anything
         return Decision(None, _best_of_names(everything, ''), (),
                         _bounded(_odds(surest.chance, margin, numbers), numbers),
-                        surest.anything)
+                        surest.anything, surest.chance)
     if named is None:
         least = min((one.chance for one in everything if one.gain > 0.0), default=1.0)
         doubt = numbers['sure_doubt'] * min(float(np.log(max(least, 1e-300)) / np.log(rate)), 1.0)
@@ -143,7 +147,7 @@ def decide(body: Block | None, loop: Block | None, settings: Settings) -> Decisi
         named.gain - one.gain < max(numbers['tie'], numbers['near'] * named.gain))]
     alike += settings.aliases.get(named.change.effect, ())
     tied = (named.change.effect, *dict.fromkeys(alike)) if alike else ()
-    return Decision(named, rivals, tied, _bounded(odds, numbers))
+    return Decision(named, rivals, tied, _bounded(odds, numbers), chance=named.chance)
 
 
 def _odds(chance: float, margin: float, numbers: Mapping[str, float]) -> float:

@@ -131,8 +131,7 @@ def _diagnosis(decision: Decision, body: Block | None, loop: Block, after: Seque
                earlier: Sequence[Segment], later: Sequence[Segment], nominal: ModelFile,
                known: Settings, progress: Progress, notes: Sequence[str]) -> Diagnosis:
     named = decision.named
-    found = finding(decision, known, math.nan if named is None else named.chance,
-                    _share(decision, body, loop, after))
+    found = finding(decision, known, _share(decision, body, loop, after))
     about = 'robot before the change, by lg_husky diagnose'
     steps = int(known.fit['evaluations'])
     names = loop.base.names

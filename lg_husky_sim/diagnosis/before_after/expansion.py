@@ -47,7 +47,7 @@ class Expansion:
     drives : sequence of Drive
         Of both sets.
     fits : tuple of numpy.ndarray, shape (n,)
-        Before and after, on the scale of the estimates.
+        Before, after and of all recordings, on the scale of the estimates.
     pool : ThreadPoolExecutor
     """
 
@@ -55,7 +55,7 @@ class Expansion:
     prior: Prior
     noise: Noise
     drives: Sequence[Drive]
-    fits: tuple[FloatArray, FloatArray]
+    fits: tuple[FloatArray, FloatArray, FloatArray]
     pool: ThreadPoolExecutor
 
     def evidence(self, linear: Evidence, changed: NDArray[np.intp]) -> float:
@@ -78,11 +78,11 @@ class Expansion:
             [nats]
         """
         index = np.flatnonzero(self.prior.free)
-        old, new = (z[index] for z in self.fits)
+        old, new, common = (z[index] for z in self.fits)
         shift = (new - old)[changed]
         at, modes = linear.modes(changed)
         begins = [(at, [self._inside(place) for place in modes])]
-        for shared, moved in ((old, 0.0 * shift), (new, -shift)):
+        for shared, moved in ((old, 0.0 * shift), (new, -shift), (common, -0.5 * shift)):
             at = np.concatenate([shared, shift])
             at[changed] += moved
             begins.append((at, [linear.level(at, changed, q.after) for q in linear.quadratics]))

@@ -36,6 +36,8 @@ class Base:
         Means and standard deviations of the priors, on the scale of the estimates.
     fixed : numpy.ndarray
         Numbers that are not estimated.
+    kinds : tuple of mapping of str to float
+        Values of robots of other kinds, from which a fit begins as well.
     reference : int
         Index of the delay of the stream against which those of the others are.
     given : bool
@@ -46,6 +48,7 @@ class Base:
     start: FloatArray
     sd: FloatArray
     fixed: FloatArray
+    kinds: tuple[Mapping[str, float], ...]
     reference: int
     given: bool = False
 
@@ -108,7 +111,13 @@ def base_of(settings: Settings, nominal: Parameters, given: bool = False,
                'wheelbase': nominal['wheelbase'], 'wheel_radius': nominal['wheel_radius'],
                'motor_resistance': nominal['motor_resistance'],
                'transmission': nominal['torque_constant'] * nominal['gear_ratio']}
-    return Base(settings, z, sd, np.array([numbers[name] for name in FIXED]), against, given)
+    # Without a speed loop the model in doubt says what voltage a command gives.
+    voltages = {
+        'loop_feedforward':
+            nominal['supply_voltage'] * nominal['command_gain'] * nominal['wheel_radius'],
+        'turn_width': 2.0 * nominal['turn_ratio'], 'yaw_damping': nominal['yaw_damping']}
+    return Base(settings, z, sd, np.array([numbers[name] for name in FIXED]),
+                tuple({**kind, **voltages} for kind in settings.kinds), against, given)
 
 
 @dataclass(frozen=True, eq=False)

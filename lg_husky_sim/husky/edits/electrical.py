@@ -54,8 +54,9 @@ def _heating(effect: Effect, number: str, other: str, side: float, axle: str) ->
 
 
 def _deadband(effect: Effect, number: str, other: str, side: float, axle: str) -> _Series:
-    row = (LawRow(Law.DEAD_ZONE, ('dead_voltage',)) if effect.shape == 'zone' else
-           LawRow(Law.DEAD_BAND, ('dead_voltage', 'dead_edge')))
+    row = {'zone': LawRow(Law.DEAD_ZONE, ('dead_voltage',)),
+           'band': LawRow(Law.DEAD_BAND, ('dead_voltage', 'dead_edge')),
+           'soft': LawRow(Law.SOFT_BAND, ('dead_voltage',))}[effect.shape]
     return row, (f'V(V_S{number})',)
 
 

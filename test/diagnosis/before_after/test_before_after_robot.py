@@ -12,12 +12,13 @@ from pathlib import Path
 from lg_husky_sim.diagnosis.before_after import diagnose_change
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
 from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT, simulate
-from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate, chance_of
+from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
 from lg_husky_sim.diagnosis.before_after.conclusion import finding
 from lg_husky_sim.diagnosis.before_after.decision import decide
 from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, ChangeCase
 from lg_husky_sim.diagnosis.before_after.drives import drives, mean_command
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
+from lg_husky_sim.diagnosis.before_after.judge import chance_of
 from lg_husky_sim.diagnosis.before_after.prediction import base_of
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
@@ -222,8 +223,9 @@ def test_a_change_without_a_name_is_unknown() -> None:
     decision = decide(None, block, known)
     assert decision.named is None
     assert decision.unnamed == 200.0
-    found = finding(decision, known, 1e-9, 0.5)
+    found = finding(decision, known, 0.5)
     assert found is not None
+    assert found.p_value == 1e-6
     assert (found.effect, found.rivals[0].effect) == ('unknown', named.change.effect)
     assert decide(None, replace(block, anything=50.0), known).named is named
     assert decide(None, replace(block, chance=0.5), known).named is named

@@ -1,0 +1,147 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which differences are beyond chance, by quadratics first and where these are renewed after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Solution
+from lg_husky_sim.diagnosis.before_after.expansion import Expansion
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+
+
+@dataclass(frozen=True, eq=False)
+class Claim:
+    """
+    That some parameters differ after.
+
+    Parameters
+    ----------
+    changed : numpy.ndarray of int
+        Their indices.
+    tries : int
+        Claims of which this is one.
+    solution : Solution
+        By quadratics about the sets' fits.
+    gain : float
+        Log evidence over that of no change [nats].
+    chance : float
+        Of such a shift, by this or any other claim, on a robot that has not changed.
+    """
+
+    changed: NDArray[np.intp]
+    tries: int
+    solution: Solution
+    gain: float
+    chance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """
+    Weighs claims.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        By quadratics about the sets' fits.
+    expansion : Expansion
+        Finds what a claim, or no change, makes likeliest.
+    freedom : float
+        Degrees of freedom of the deviations from recording to recording.
+    numbers : mapping of str to float
+        ``decision`` of the settings.
+    """
+
+    evidence: Evidence
+    expansion: Expansion
+    freedom: float
+    numbers: Mapping[str, float]
+
+    def claim(self, changed: NDArray[np.intp], tries: int) -> Claim:
+        """Return the claim that these parameters differ, by quadratics."""
+        solved = self.evidence.solve(changed)
+        return self._less(Claim(changed, tries, solved, solved.evidence - self._nothing, 1.0), 0.0)
+
+    def checked(self, claims: Sequence[Claim]) -> list[Claim]:
+        """
+        Return claims with what holds of their gains.
+
+        Far from the sets' fits the quadratics about these are not to be trusted. A claim beyond
+        chance that may be the best gains no more than its evidence about what it makes likeliest
+        is over that of no change about what that does.
+
+        Parameters
+        ----------
+        claims : sequence of Claim
+
+        Returns
+        -------
+        list of Claim
+            In the same order.
+        """
+        found = list(claims)
+        best = 0.0
+        for k in sorted(range(len(claims)), key=lambda k: -claims[k].gain):
+            one = claims[k]
+            if not self._is_beyond_chance(one):
+                continue
+            if one.gain > best - max(self.numbers['tie'], self.numbers['near'] * best):
+                held = self.expansion.evidence(self.evidence, one.changed) - self._renewed
+                found[k] = self._less(one, one.gain - held)
+                best = max(best, found[k].gain)
+            else:
+                found[k] = self.about_nothing(one)
+        return found
+
+    def about_nothing(self, one: Claim) -> Claim:
+        """Return a claim over no change about what that makes likeliest."""
+        return self._less(one, self._renewed - self._nothing) if self._is_beyond_chance(
+            one) else one
+
+    def _is_beyond_chance(self, one: Claim) -> bool:
+        return one.gain > 0.0 and one.chance < self.numbers['false_alarm_rate']
+
+    def _less(self, one: Claim, less: float) -> Claim:
+        less = max(less, 0.0)
+        return replace(one, gain=one.gain - less, chance=min(1.0, (
+            self.numbers['questions'] * one.tries * chance_of(one.solution, self.freedom, less))))
+
+    @cached_property
+    def _nothing(self) -> float:
+        return self.evidence.solve(np.zeros(0, dtype=np.intp)).evidence
+
+    @cached_property
+    def _renewed(self) -> float:
+        return self.expansion.evidence(self.evidence, np.zeros(0, dtype=np.intp))
+
+
+def chance_of(solved: Solution, freedom: float, less: float = 0.0) -> float:
+    """
+    Return how probable so large a shift is where nothing has changed.
+
+    The deviations from recording to recording are themselves estimated, so that the shift d of k
+    parameters with covariance C is judged by Fisher's distribution::
+
+        P(F(k, freedom) > (d' C^-1 d - 2 less) / k)
+
+    Parameters
+    ----------
+    solved : Solution
+    freedom : float
+        Degrees of freedom of the deviations.
+    less : float
+        What the expansions say too much [nats].
+
+    Returns
+    -------
+    float
+    """
+    size = solved.shift.size
+    square = float(solved.shift @ np.linalg.solve(solved.covariance, solved.shift)) - 2.0 * less
+    return float(fisher.sf(square / size, size, freedom))
