@@ -133,10 +133,11 @@ def compare(base: Base, before: Sequence[Drive], after: Sequence[Drive], begin: 
                           key=lambda one: one.cost).z
                       for fit, drives in zip(sets, (before, after), strict=True))
     noise = renewed()
-    quadratics = [*_quadratics(base, before, noise, earlier, later, prior, pool, False),
-                  *_quadratics(base, after, noise, later, earlier, prior, pool, True)]
+    apart, together = ([*_quadratics(base, before, noise, old, new, prior, pool, False),
+                        *_quadratics(base, after, noise, new, old, prior, pool, True)]
+                       for old, new in ((earlier, later), (common, common)))
     share(0.9)
-    found = _candidates(base, prior, quadratics, Expansion(
+    found = _candidates(base, prior, apart, together, Expansion(
         base, prior, noise, every, (earlier, later, common), pool))
     share(1.0)
     return Block(base, earlier, later, noise, *found)
@@ -208,21 +209,22 @@ def _quadratics(base: Base, drives: Sequence[Drive], noise: Noise, z: FloatArray
     return joined(list(pool.map(one, drives)))
 
 
-def _candidates(base: Base, prior: Prior, quadratics: Sequence[Quadratic],
-                expansion: Expansion
+def _candidates(base: Base, prior: Prior, apart: Sequence[Quadratic],
+                together: Sequence[Quadratic], expansion: Expansion
                 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float, float]:
     quantities = base.settings.quantities
     index = np.flatnonzero(prior.free)
     place = {quantities[k].name: i for i, k in enumerate(index)}
-    reduced = [q.among(index) for q in quadratics]
     numbers = base.settings.fit
     shown = 'body' if base.given else 'loop'
     weight = numbers[f'recordings_{shown}']
-    evidence = Evidence(reduced, prior.mean[index], prior.sd[index],
-                        np.array([quantities[k].recording for k in index]),
-                        np.array([quantities[k].change for k in index])).estimated(
-                            weight, int(numbers['recording_rounds']))
-    judge = Judge(evidence, expansion, max(weight + len(reduced) - 2.0, 1.0),
+    fits, common = (
+        Evidence([q.among(index) for q in parts], prior.mean[index], prior.sd[index],
+                 np.array([quantities[k].recording for k in index]),
+                 np.array([quantities[k].change for k in index])).estimated(
+                     weight, int(numbers['recording_rounds']))
+        for parts in (apart, together))
+    judge = Judge(fits, common, expansion, max(weight + len(fits.quadratics) - 2.0, 1.0),
                   base.settings.decision)
     count = sum(c.block == shown for c in base.settings.changes)
     changes = [(c, c.parameters if base.given else (*c.parameters, *c.more))

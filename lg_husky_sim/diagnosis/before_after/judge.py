@@ -48,8 +48,8 @@ class Judge:
 
     Parameters
     ----------
-    evidence : Evidence
-        By quadratics about the sets' fits.
+    evidence, common : Evidence
+        By quadratics about the sets' fits, and about what fits all recordings best.
     expansion : Expansion
         Finds what a claim, or no change, makes likeliest.
     freedom : float
@@ -59,6 +59,7 @@ class Judge:
     """
 
     evidence: Evidence
+    common: Evidence
     expansion: Expansion
     freedom: float
     numbers: Mapping[str, float]
@@ -72,9 +73,10 @@ class Judge:
         """
         Return claims with what holds of their gains.
 
-        Far from the sets' fits the quadratics about these are not to be trusted. A claim beyond
-        chance that may be the best gains no more than its evidence about what it makes likeliest
-        is over that of no change about what that does.
+        Two fits that end on different summits look like a change. A claim beyond chance that may
+        be the best holds if it is that about the common fit too, where there is one summit. Else,
+        as that may be far from both sets, it gains no more than its evidence about what it makes
+        likeliest is over that of no change about what that does.
 
         Parameters
         ----------
@@ -91,12 +93,12 @@ class Judge:
             one = claims[k]
             if not self._is_beyond_chance(one):
                 continue
+            found[k] = self.about_nothing(one)
             if one.gain > best - max(self.numbers['tie'], self.numbers['near'] * best):
-                held = self.expansion.evidence(self.evidence, one.changed) - self._renewed
-                found[k] = self._less(one, one.gain - held)
+                if not self._holds_about_the_common_fit(one):
+                    held = self.expansion.evidence(self.evidence, one.changed) - self._renewed
+                    found[k] = self._less(one, one.gain - held)
                 best = max(best, found[k].gain)
-            else:
-                found[k] = self.about_nothing(one)
         return found
 
     def about_nothing(self, one: Claim) -> Claim:
@@ -104,13 +106,17 @@ class Judge:
         return self._less(one, self._renewed - self._nothing) if self._is_beyond_chance(
             one) else one
 
+    def _holds_about_the_common_fit(self, one: Claim) -> bool:
+        chance = one.tries * chance_of(self.common.solve(one.changed), self.freedom)
+        return chance < self.numbers['false_alarm_rate']
+
     def _is_beyond_chance(self, one: Claim) -> bool:
         return one.gain > 0.0 and one.chance < self.numbers['false_alarm_rate']
 
     def _less(self, one: Claim, less: float) -> Claim:
         less = max(less, 0.0)
-        return replace(one, gain=one.gain - less, chance=min(1.0, (
-            self.numbers['questions'] * one.tries * chance_of(one.solution, self.freedom, less))))
+        return replace(one, gain=one.gain - less, chance=min(
+            1.0, one.tries * chance_of(one.solution, self.freedom, less)))
 
     @cached_property
     def _nothing(self) -> float:
