@@ -78,8 +78,8 @@ class Sensors:
         self._history.clear()
 
     def _stale(self, delay: float) -> tuple[float, ...]:
-        # The values of ``delay`` ago, linear between steps.
-        back = min(delay / self._period, len(self._history) - 1.0)
+        # The values of ``delay`` ago, linear between steps; those of now for an early stream.
+        back = min(max(delay, 0.0) / self._period, len(self._history) - 1.0)
         whole = int(back)
         near = self._history[-1 - whole]
         share = back - whole

@@ -4,9 +4,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
+from pathlib import Path
 
 from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
 from lg_husky_sim.ros.engine import limited
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.signals import BodyTwist
@@ -176,3 +180,15 @@ def test_unusable_models_leave_the_running_one() -> None:
         husky.engine.configure(bad)
     assert husky.engine.settings == husky.settings
     assert husky.step().twist.forward > 0.4
+
+
+def test_an_imu_that_is_early_reads_what_is_now(tmp_path: Path) -> None:
+    """Nothing can be read ahead of time; a model with early stamps runs all the same."""
+    model, early = load_model(), Effect('sensor_time_offset', shape='imu')
+    numbers = model.parameters.with_entries(*(one.parameter() for one in early.parameters()))
+    save_model(ModelFile(replace(model.structure, effects=(early,)),
+                         numbers.replacing({'stamp_delay': -0.24})), tmp_path / 'early.yaml')
+    husky = LockStepHusky(model=str(tmp_path / 'early.yaml'))
+    for _ in range(60):
+        reading = husky.step(BodyTwist(0.0, 0.5))
+        assert reading.measured.gyro == pytest.approx(reading.twist.yaw)
