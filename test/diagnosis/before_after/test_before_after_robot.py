@@ -208,7 +208,7 @@ def test_a_shift_is_judged_by_what_recordings_differ_by(deviation: float, beyond
     ({'late': 0.06}, 'sensor_time_offset')])
 def test_other_logs_show_the_same(how: Mapping[str, float], effect: str) -> None:
     """Wheel rates at 20 Hz through a low-pass, and no accelerometer."""
-    said = changed({}, 5, rate=20.0, low_pass=0.08, accelerometer=0.0, **how).diagnosis
+    said = changed({}, 7, rate=20.0, low_pass=0.08, accelerometer=0.0, **how).diagnosis
     assert [one.effect for one in said.findings] == [effect]
 
 
