@@ -21,11 +21,9 @@ ROBOT: Final = (
     'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak', 'reference_lag')
 #: Numbers that are not estimated, read behind them.
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
-                'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate')
+                'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate', 'least_share')
 #: Columns of what is simulated: base_link's velocity, wheels, specific force at the centre.
 OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'accel_y')
-
-_LEAST_SHARE: Final = 0.02  # of the load that an axle or a side keeps: it does not lift off
 
 
 @jit
@@ -60,6 +58,7 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     build = step / p[32]
     wheelbase, resistance, emf, radius = p[35], p[36], p[37], p[38]
     load_time, dry_speed, rolling_speed, gravity, rest_rate = p[39], p[40], p[41], p[42], p[43]
+    least_share = p[44]
     kept = np.exp(-p[33] * step)
     follow = 1.0 - np.exp(-step / p[34])
     half, side = 0.5 * wheelbase, 0.5 * track
@@ -106,8 +105,8 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
         gy = -(-slope_x * level[k, 1] + slope_y * level[k, 0])
         front = 0.5 * (1.0 + (xc - height * acc_x / gravity) / half)
         left = 0.5 * (1.0 + (yc - height * acc_y / gravity) / side)
-        front = min(max(front, _LEAST_SHARE), 1.0 - _LEAST_SHARE)
-        left = min(max(left, _LEAST_SHARE), 1.0 - _LEAST_SHARE)
+        front = min(max(front, least_share), 1.0 - least_share)
+        left = min(max(left, least_share), 1.0 - least_share)
         # Chassis: [m v, m u, jz r] with the tyres' secant slopes c.
         a00 = m + rolling * mass * gravity / np.sqrt(v * v + rolling_speed * rolling_speed)
         a01, a02, a11, a12 = 0.0, 0.0, m, 0.0

@@ -222,7 +222,7 @@ def _candidates(base: Base, prior: Prior, apart: Sequence[Quadratic],
         Evidence([q.among(index) for q in parts], prior.mean[index], prior.sd[index],
                  np.array([quantities[k].recording for k in index]),
                  np.array([quantities[k].change for k in index])).estimated(
-                     weight, int(numbers['recording_rounds']))
+                     weight, int(numbers['recording_rounds']), numbers['recording_free'])
         for parts in (apart, together))
     judge = Judge(fits, common, expansion, max(weight + len(fits.quadratics) - 2.0, 1.0),
                   base.settings.decision)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
+from lg_husky_sim.diagnosis.before_after.judge import is_beyond_chance
 from lg_husky_sim.diagnosis.before_after.settings import Settings
 import numpy as np
 
@@ -64,7 +65,7 @@ def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], whole: Sequen
     """
     first = _settled(body, whole, numbers)
     other = _simplest(loop, numbers)
-    options = [one for one in (first, other) if one is not None and is_claimed(one, numbers)]
+    options = [one for one in (first, other) if one is not None and is_beyond_chance(one, numbers)]
     if len(options) == 2:
         as_well = max((one.gain for one in whole if one.change is options[0].change), default=0.0)
         if options[1].gain < max(numbers['loop_share'] * options[0].gain, as_well):
@@ -72,16 +73,11 @@ def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], whole: Sequen
     return max(options, key=lambda one: one.gain, default=None)
 
 
-def is_claimed(one: Candidate, numbers: Mapping[str, float]) -> bool:
-    """Return whether a change is beyond what chance gives at the false-alarm rate."""
-    return one.gain > 0.0 and one.chance < numbers['false_alarm_rate']
-
-
 def _settled(body: Sequence[Candidate], whole: Sequence[Candidate], numbers: Mapping[str, float]
              ) -> Candidate | None:
     # Names that gain as much in the body's motion, by what they gain in all channels.
     near = [one for one in body if body[0].gain - one.gain < numbers['tie']
-            and is_claimed(one, numbers)]
+            and is_beyond_chance(one, numbers)]
     if len(near) < 2:
         return _simplest(body, numbers)
     changes = [one.change for one in near]
@@ -96,7 +92,7 @@ def _simplest(candidates: Sequence[Candidate], numbers: Mapping[str, float]) -> 
         return None
     best = candidates[0]
     equal = [one for one in candidates if best.gain - one.gain < numbers['smaller']
-             and is_claimed(one, numbers)
+             and is_beyond_chance(one, numbers)
              and set(one.change.parameters) < set(best.change.parameters)]
     return min(equal, key=lambda one: len(one.change.parameters), default=best)
 
@@ -143,7 +139,7 @@ def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
     second = max(rivals[0].gain, 0.0) if rivals else 0.0
     margin = float(np.clip(1.0 - second / named.gain, 0.0, 1.0))
     odds = _odds(named.chance, margin, numbers)
-    alike = [one.change.effect for one in rivals if is_claimed(one, numbers) and (
+    alike = [one.change.effect for one in rivals if is_beyond_chance(one, numbers) and (
         named.gain - one.gain < max(numbers['tie'], numbers['near'] * named.gain))]
     alike += settings.aliases.get(named.change.effect, ())
     tied = (named.change.effect, *dict.fromkeys(alike)) if alike else ()

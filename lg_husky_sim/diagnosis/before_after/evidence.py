@@ -99,7 +99,7 @@ class Evidence:
     recording_sd: FloatArray
     change_sd: FloatArray
 
-    def estimated(self, weight: float, rounds: int) -> Evidence:
+    def estimated(self, weight: float, rounds: int, free: float) -> Evidence:
         """
         Return this with deviations from recording to recording as these data have them.
 
@@ -113,13 +113,15 @@ class Evidence:
             Recordings that the assumed deviations are worth.
         rounds : int
             Of the iteration.
+        free : float
+            Factor on the prior of a change: one of any size is no deviation.
 
         Returns
         -------
         Evidence
         """
         n = self.mean.size
-        found = self
+        found = replace(self, change_sd=free * self.change_sd)
         for _ in range(rounds):
             at, covariance, _ = found._posterior(np.arange(n))
             sd = found.recording_sd
@@ -134,10 +136,10 @@ class Evidence:
                 deviation = spread @ (sd * one.slope) - move @ at
                 squares += deviation ** 2 + np.diag(spread) + np.einsum(
                     'ij,jk,ik->i', move, covariance, move)
-            found = replace(self, recording_sd=np.sqrt(
+            found = replace(found, recording_sd=np.sqrt(
                 (weight * self.recording_sd ** 2 + sd ** 2 * squares)
                 / (weight + len(self.quadratics))))
-        return found
+        return replace(found, change_sd=self.change_sd)
 
     def modes(self, changed: NDArray[np.intp]) -> tuple[FloatArray, list[FloatArray]]:
         """Return what is shared and differs, and each recording's likeliest parameters."""

@@ -7,12 +7,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Solution
 from lg_husky_sim.diagnosis.before_after.expansion import Expansion
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
+
+
+class Weighed(Protocol):
+    """What has a gain [nats] and a chance."""
+
+    @property
+    def gain(self) -> float: ...
+    @property
+    def chance(self) -> float: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +84,9 @@ class Judge:
         Return claims with what holds of their gains.
 
         Two fits that end on different summits look like a change. A claim beyond chance that may
-        be the best holds if it is that about the common fit too, where there is one summit. Else,
-        as that may be far from both sets, it gains no more than its evidence about what it makes
-        likeliest is over that of no change about what that does.
+        be the best holds if it is so about the common fit too, where there is one summit. As that
+        may be far from both sets, it else gains no more than its evidence, about what it makes
+        likeliest, has over that of no change, about what no change makes likeliest.
 
         Parameters
         ----------
@@ -91,7 +101,7 @@ class Judge:
         best = 0.0
         for k in sorted(range(len(claims)), key=lambda k: -claims[k].gain):
             one = claims[k]
-            if not self._is_beyond_chance(one):
+            if not is_beyond_chance(one, self.numbers):
                 continue
             found[k] = self.about_nothing(one)
             if one.gain > best - max(self.numbers['tie'], self.numbers['near'] * best):
@@ -103,15 +113,12 @@ class Judge:
 
     def about_nothing(self, one: Claim) -> Claim:
         """Return a claim over no change about what that makes likeliest."""
-        return self._less(one, self._renewed - self._nothing) if self._is_beyond_chance(
-            one) else one
+        return self._less(one, self._renewed - self._nothing) if is_beyond_chance(
+            one, self.numbers) else one
 
     def _holds_about_the_common_fit(self, one: Claim) -> bool:
         chance = one.tries * chance_of(self.common.solve(one.changed), self.freedom)
         return chance < self.numbers['false_alarm_rate']
-
-    def _is_beyond_chance(self, one: Claim) -> bool:
-        return one.gain > 0.0 and one.chance < self.numbers['false_alarm_rate']
 
     def _less(self, one: Claim, less: float) -> Claim:
         less = max(less, 0.0)
@@ -125,6 +132,11 @@ class Judge:
     @cached_property
     def _renewed(self) -> float:
         return self.expansion.evidence(self.evidence, np.zeros(0, dtype=np.intp))
+
+
+def is_beyond_chance(one: Weighed, numbers: Mapping[str, float]) -> bool:
+    """Return whether something gains, by more than chance gives at the false-alarm rate."""
+    return one.gain > 0.0 and one.chance < numbers['false_alarm_rate']
 
 
 def chance_of(solved: Solution, freedom: float, less: float = 0.0) -> float:

@@ -194,13 +194,23 @@ def test_a_shift_is_judged_by_what_recordings_differ_by(deviation: float, beyond
     precise = np.array([[1e8]])
     recordings = [Quadratic(f'rec{k}', k > 2, precise, 1e8 * places[k:k + 1]) for k in range(6)]
     evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.001),
-                        np.full(1, 0.1)).estimated(2.0, 30)
+                        np.full(1, 0.1)).estimated(2.0, 30, 30.0)
     solved = evidence.solve(np.array([0]))
     assert solved.shift[0] == pytest.approx(0.05, rel=0.3)
     assert evidence.recording_sd[0] == pytest.approx(
         np.sqrt((2.0 * 0.001 ** 2 + np.sum((places - np.repeat(
             [places[:3].mean(), places[3:].mean()], 3)) ** 2)) / 8.0), rel=0.3)
     assert (30 * chance_of(solved, 6.0) < 0.02) is beyond
+
+
+def test_a_change_of_forty_times_its_prior_is_no_deviation() -> None:
+    recordings = [Quadratic(f'rec{k}', k > 1, np.array([[1e6]]), np.array([-4e6 * (k > 1)]))
+                  for k in range(4)]
+    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.02), np.full(1, 0.1))
+    found = evidence.estimated(2.0, 30, settings().fit['recording_free'])
+    assert found.recording_sd[0] < 0.021
+    assert found.change_sd[0] == 0.1
+    assert evidence.estimated(2.0, 30, 1.0).recording_sd[0] > 0.5
 
 
 @pytest.mark.parametrize(('how', 'effect'), [
@@ -234,8 +244,11 @@ def test_a_change_without_a_name_is_unknown() -> None:
 
 
 def test_the_order_of_recordings_does_not_matter() -> None:
-    before, later = before_and_worn()
-    one, other = worn().decision, said_of(later[::-1], before[::-1]).decision
+    """With a shifted centre of mass, whose two names are nearly the same."""
+    before = [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)]
+    later = [driven('rec1', {'com_x': -0.05}, 3, OTHER), driven('rec2', {'com_x': -0.05}, 4)]
+    one, other = (said_of(a, b).decision for a, b in (
+        (later, before), (later[::-1], before[::-1])))
     assert one.named is not None
     assert other.named is not None
     assert one.named.change == other.named.change
