@@ -99,6 +99,8 @@ class EffectParameter:
         Forms that have it; empty for all.
     linear : bool
         Whether it is estimated on a linear scale though it has one sign only.
+    jitter : mapping of str to str
+        Of a delay: which jitter of a log it may come of, by the effect's shape.
     """
 
     name: str
@@ -111,6 +113,7 @@ class EffectParameter:
     negligible: float = 0.0
     shapes: tuple[str, ...] = ()
     linear: bool = False
+    jitter: Mapping[str, str] = field(default_factory=dict)
 
     def parameter(self, value: float | None = None) -> Parameter:
         """Return it as a parameter with ``value``, or with its first start."""
@@ -286,7 +289,8 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
         EffectParameter(key, str(p['unit']), float(p['lower']), float(p['upper']),
                         tuple(float(s) for s in p['starts']), str(p['source']),
                         bool(p.get('fixed', False)), float(p.get('negligible', 0.0)),
-                        tuple(p.get('shapes', ())), bool(p.get('linear', False)))
+                        tuple(p.get('shapes', ())), bool(p.get('linear', False)),
+                        dict(p.get('jitter', {})))
         for key, p in entry['parameters'].items())
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),

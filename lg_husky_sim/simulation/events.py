@@ -57,7 +57,7 @@ class Events:
             if len(commands) == 0:
                 raise ParameterError('start is not given, and there is no command to start at')
             start = float(commands.times[0])
-        wanted = np.asarray(times, dtype=np.float64).ravel()
+        wanted = np.array(times, dtype=np.float64).ravel()  # a copy: its type is one, writable
         if not math.isfinite(start) or not np.all(np.isfinite(wanted)):
             raise ParameterError(f'start = {start} s and the {wanted.size} times must be finite')
         if wanted.size and wanted.min() < start:

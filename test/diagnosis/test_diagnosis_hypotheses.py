@@ -15,6 +15,7 @@ from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, neutral_of
+from lg_husky_sim.diagnosis.selection.rounds import is_negligible, Tried
 from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -119,3 +120,20 @@ def test_an_effect_at_its_neutral_numbers_predicts_what_the_base_predicts(
     part = 0.004 if hypothesis.effect.id == 'command_slew' else 0.001
     off = float(np.sqrt(np.mean((plain - other) ** 2)))
     assert off < part * float(np.std(evidence.drives[0].measured))
+
+
+@pytest.mark.parametrize(('name', 'shape', 'jitter'), [
+    ('command_latency', '', 'command_jitter'), ('sensor_time_offset', 'wheels', 'wheel_jitter'),
+    ('sensor_time_offset', 'imu', 'imu_jitter'), ('sensor_time_offset', 'pose', 'pose_jitter')])
+def test_a_delay_that_jitter_brings_is_not_called_missing(
+        setup: tuple[Evidence, Point], name: str, shape: str, jitter: str) -> None:
+    """A base that looks for commands every 20 ms is 10 ms late, and 6 ms more or less."""
+    evidence, start = setup
+    one = next(h for h in ALL if h.effect.id == name and h.effect.shape == shape)
+    (parameter,) = one.free
+    point = one.point(start, {parameter.name: 0.009})
+    fit = evidence.fit(point, rounds=0)
+    quiet = dict.fromkeys(evidence.noise.values, 1e-4)
+    tried = Tried(one, fit, 50.0, evidence.count)
+    assert not is_negligible(tried, quiet)
+    assert is_negligible(tried, {**quiet, jitter: 0.02 / 12 ** 0.5})

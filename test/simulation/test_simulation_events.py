@@ -188,3 +188,12 @@ def test_modes_rebuild_a_matrix_even_without_enough_eigenvectors(
     np.testing.assert_allclose(modes.out_of @ modes.into, np.eye(len(a)), atol=1e-9)
     np.testing.assert_allclose(modes.out_of @ whole @ modes.into, a, rtol=0,
                                atol=1e-8 * np.abs(a).max())
+
+
+def test_times_that_nobody_may_write_are_of_the_type_that_is_compiled() -> None:
+    """An array that is read-only would have the kernel compiled a second time."""
+    times = np.linspace(0.0, 1.0, 5)
+    times.flags.writeable = False
+    events = Events(drive(), times, start=0.0)
+    assert events.times.flags.writeable
+    np.testing.assert_array_equal(events.times, times)

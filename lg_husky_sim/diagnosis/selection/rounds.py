@@ -9,7 +9,7 @@ comparable only under one whitener.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import itertools
 import math
@@ -22,7 +22,7 @@ from lg_husky_sim.diagnosis.selection.onsets import onset_looks, refined
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
-from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.effects import Effect, EffectParameter
 import numpy as np
 
 
@@ -202,10 +202,11 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     tried = [_best_form(evidence, base, t) for t in tried[:2]] + tried[2:]
-    tried.sort(key=lambda t: (is_negligible(t), -t.score))
+    # Where one of everyday size explains most, what explains less is an image of that.
+    tried.sort(key=lambda t: -t.score)
     tried = _from_the_start(evidence, base, tried)
     best = tried[0]
-    chance = 1.0 if is_negligible(best) else _chance(evidence, best, starts)
+    chance = 1.0 if is_negligible(best, evidence.noise.values) else _chance(evidence, best, starts)
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
 
 
@@ -236,10 +237,15 @@ def _chance(evidence: Evidence, tried: Tried, starts: int) -> float:
                      dispersion(evidence, tried.fit.whitened, own))
 
 
-def is_negligible(tried: Tried) -> bool:
+def is_negligible(tried: Tried, jitter: Mapping[str, float]) -> bool:
     """Return whether every number of a fitted effect is less than what counts."""
-    values = tried.fit.point.values
-    return all(abs(values[p.name] - (neutral_of(p) or 0.0)) < p.negligible
+    values, shape = tried.fit.point.values, tried.hypothesis.effect.shape
+
+    def least(parameter: EffectParameter) -> float:
+        of = parameter.jitter.get(shape)
+        return max(parameter.negligible, setting('late_by_jitter') * jitter[of] if of
+                   else 0.0)
+    return all(abs(values[p.name] - (neutral_of(p) or 0.0)) < least(p)
                for p in tried.hypothesis.free)
 
 
