@@ -202,8 +202,7 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     tried = [_best_form(evidence, base, t) for t in tried[:2]] + tried[2:]
-    # Where one of everyday size explains most, what explains less is an image of that.
-    tried.sort(key=lambda t: -t.score)
+    tried.sort(key=lambda t: (is_negligible(t, evidence.noise.values), -t.score))
     tried = _from_the_start(evidence, base, tried)
     best = tried[0]
     chance = 1.0 if is_negligible(best, evidence.noise.values) else _chance(evidence, best, starts)
