@@ -51,7 +51,7 @@ class Missing:
         [s], mean and standard deviation [unit of the balance].
     evidence : float
         Log evidence of the balance over all drives [nats]: of an effort of one size all the
-        time that is larger than the disturbance there, or of one that bursts.
+        time, or of one that bursts.
     """
 
     balance: str
@@ -102,11 +102,6 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
             first, top = first + size, top + block.shape[0]
         normal, slope = projection.problem(columns)
         gain, values, deviations = log_evidence(normal, slope)
-        # One that acts all the time and is no larger than the disturbance that is known there
-        # tells of that one's colour only.
-        known = evidence.noise.values['drive' if BALANCES[balance][2] != 'none' else balance]
-        if np.sqrt(np.mean(values ** 2)) < known:
-            gain = 0.0
         if BALANCES[balance][2] == 'none':
             # Those of the wheels burst with every command that comes a little late.
             gain = max(gain, burst_evidence(slope / np.sqrt(np.maximum(np.diag(normal), 1e-12))))

@@ -21,7 +21,6 @@ from lg_husky_sim.diagnosis.evidence.noise import (
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.evidence.whitener import MODEL
-from lg_husky_sim.diagnosis.localisation import missing_efforts
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
@@ -140,21 +139,3 @@ def test_a_decay_faster_than_a_step_of_the_filter_is_slowed_and_no_gain_with_it(
     assert abs(usual[rate]) < abs(stiff[rate]) <= 0.5 / setting('longest_step') + 1e-9
     for gain in (by_moment, by_voltage):
         np.testing.assert_allclose(stiff[gain] / stiff[rate], usual[gain] / usual[rate], rtol=1e-6)
-
-
-def test_an_effort_no_larger_than_the_disturbance_there_is_no_evidence(
-        drive: Callable[..., Recording]) -> None:
-    """3 N·m of dry friction on the left, under little and under much of a disturbance."""
-    drives, model = drives_of([drive('ahead', 'drivetrain', 1)]), load_model()
-    start = beginning(model.structure, base_unknowns(model.parameters, drives),
-                      model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
-        known = evidence_of(drives, ['ahead'], start, TRUE, pool)
-        rough = Evidence(known.drives, known.names, Noise({**TRUE.values, 'drive': 20.0}),
-                         known.whiteners, pool)
-        fit = known.fit(start, rounds=2)
-        seen, hidden = ({one.balance: one.evidence for one in missing_efforts(evidence, fit)}
-                        for evidence in (known, rough))
-    assert seen['torque_left'] > 10.0
-    assert hidden['torque_left'] == hidden['torque_right'] == 0.0
-    assert hidden['moment'] == seen['moment']
