@@ -255,9 +255,13 @@ def _signature(plant: Plant) -> bytes:
 def _rate(motion: Motion, drive: Drive, side: str, reading: Reading, late: float) -> FloatArray:
     if reading.wheels is WheelReading.FILTERED:
         step = setting('filter_step')
-        keep = np.exp(-step / max(reading.get('wheel_window'), 1e-6))
+        # Exact for a rate that is straight within a step.
+        lag = max(reading.get('wheel_window'), 1e-6)
+        keep = np.exp(-step / lag)
+        share = lag / step * (1.0 - keep)
         rate = motion.column(f'wheel_{side}', 'wheels')
-        followed = lfilter([1.0 - keep], [1.0, -keep], rate, zi=[keep * rate[0]])[0]
+        followed = lfilter([1.0 - share, share - keep], [1.0, -keep], rate, zi=[
+            share * rate[0]])[0]
         found: FloatArray = np.interp(
             drive.wheel_times - late, motion.times[motion.wanted.parts['wheels']], followed)
         return found

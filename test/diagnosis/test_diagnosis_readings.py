@@ -1,0 +1,83 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What sensors read of a motion, and when a stamp is off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import math
+
+from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drives_of
+from lg_husky_sim.diagnosis.evidence.observation import observe, Reading, simulate, WheelReading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, loosened, Unknown
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import Recording
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+
+@pytest.fixture(scope='module')
+def driven(drive: Callable[..., Recording]) -> Drive:
+    """Return one drive of a robot that lacks nothing."""
+    return drives_of([drive('ahead', 'nothing', 1)])[0]
+
+
+@pytest.mark.parametrize('lag', [0.008, 0.025, 0.075])
+def test_a_low_pass_follows_the_rate_of_a_wheel(driven: Drive, lag: float) -> None:
+    """An integrator of high order agrees within a tenth of what a Husky rounds to."""
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    at_once = Reading(values={'wheel_window': setting('shortest_window')})
+    fine = 0.0005
+    times = np.arange(driven.start, driven.start + 6.0, fine)
+    dense = replace(driven, wheel_times=times, measured=np.zeros(2 * times.size),
+                    times=np.tile(times, 2), channels=np.repeat(
+                        [int(Channel.WHEEL_LEFT), int(Channel.WHEEL_RIGHT)], times.size),
+                    imu_times=times[:0], pose_times=times[:0], end=float(times[-1]))
+    rates = observe(simulate(plant, dense, at_once), dense, at_once)[:times.size]
+    # A mean over a millisecond that ends at the stamp is the rate half of it earlier.
+    middles = times - 0.5 * setting('shortest_window')
+    solved = solve_ivp(lambda t, y: (np.interp(t, middles, rates) - y) / lag,
+                       (float(times[0]), float(times[-1])), [rates[0]], method='RK45',
+                       max_step=0.002, rtol=1e-8, atol=1e-10, dense_output=True)
+    filtered = Reading(WheelReading.FILTERED, values={'wheel_window': lag})
+    seen = observe(simulate(plant, driven, filtered), driven, filtered)
+    left = seen[driven.slice_of(Channel.WHEEL_LEFT)]
+    early = driven.wheel_times < times[-1]
+    moving = np.ptp(left[early])
+    assert moving > 1.0
+    error = left[early] - solved.sol(driven.wheel_times[early])[0]
+    assert np.max(np.abs(error)) < 0.1 * 0.01 / model.parameters['wheel_radius']
+
+
+def _delay(driven: Drive, name: str) -> Unknown:
+    return next(u for u in base_unknowns(load_model().parameters, [driven]) if u.name == name)
+
+
+@pytest.mark.parametrize(('name', 'stream'), [
+    ('delay_wheels', 'wheel_times'), ('delay_imu', 'imu_times'), ('delay_pose', 'pose_times')])
+def test_a_stamp_stands_for_any_moment_of_its_period(
+        driven: Drive, name: str, stream: str) -> None:
+    own = setting('stamp_offset')
+    for every in (1, 4):
+        slower = replace(driven, **{stream: getattr(driven, stream)[::every]})
+        period = float(np.median(np.diff(getattr(slower, stream))))
+        one = _delay(slower, name)
+        assert one.deviation == pytest.approx(math.hypot(own, period / math.sqrt(12.0)))
+        assert one.upper == -one.lower
+        assert 0.5 * period < one.upper < 0.5 * period + 10.0 * own
+
+
+def test_jitter_loosens_a_delay_and_does_so_once(driven: Drive) -> None:
+    one = _delay(driven, 'delay_pose')
+    (loose,) = loosened([one], {'delay_pose': 0.02})
+    assert loose.deviation == pytest.approx(
+        math.hypot(one.deviation, setting('late_by_jitter') * 0.02))
+    assert loose.upper > one.upper
+    assert loosened([loose], {'delay_pose': 0.02}) == (loose,)
+    assert loosened([loose], {'delay_pose': 0.0}) == (one,)
+    assert loosened([one], {'delay_imu': 0.02}) == (one,)
