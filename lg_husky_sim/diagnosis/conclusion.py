@@ -170,12 +170,13 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     -------
     Answer
     """
-    left = max([0.0, *(e.evidence for e in rest[:1]), *(m.evidence for m in free)])
+    left = max([0.0, *(e.evidence for e in rest), *(m.evidence for m in free)])
+    explained = max([0.0, *(e.explained for e in rest), *(m.explained for m in free)])
     first = search.rounds[0]
     tried = first.tried
     if not search.adopted:
         gain = max(tried[0].gain, 0.0) if tried else 0.0
-        features = confidence.Features(gain, 0.0, left / max(gain, 1.0), first.chance)
+        features = confidence.Features(gain, 0.0, explained / max(gain, 1.0), first.chance)
         if left > setting('unknown_alone'):
             return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
         return Answer(Verdict.NOTHING_MISSING, confidence.of_nothing(features), features)
@@ -183,7 +184,7 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     others = [t.gain for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id]
     second = max([0.0, *others])
     features = confidence.Features(best.gain, 1.0 - second / max(best.gain, 1e-9),
-                                   left / max(_explained(search), best.gain), first.chance)
+                                   explained / max(_explained(search), best.gain), first.chance)
     if left > setting('unknown_evidence') and features.share > setting('unknown_share'):
         return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
     return Answer(Verdict.KNOWN, confidence.of_name(features), features)

@@ -17,7 +17,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import probe_times
 from lg_husky_sim.diagnosis.evidence.whitener import respond
 from lg_husky_sim.diagnosis.hypotheses.bursts import burst_evidence
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, hats, log_evidence
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, beyond_chance, hats
 from lg_husky_sim.diagnosis.result import Mismatch
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.settings import setting
@@ -51,7 +51,9 @@ class Missing:
         [s], mean and standard deviation [unit of the balance].
     evidence : float
         Log evidence of the balance over all drives [nats]: of an effort of one size all the
-        time, or of one that bursts.
+        time, or of one that bursts, where innovations are not quite white.
+    explained : float
+        The same of white ones.
     """
 
     balance: str
@@ -60,6 +62,31 @@ class Missing:
     values: FloatArray
     deviations: FloatArray
     evidence: float
+    explained: float
+
+
+def steady_knots(drive: Drive, count: int) -> np.typing.NDArray[np.bool_]:
+    """
+    Return which efforts over time tell of bursts.
+
+    Parameters
+    ----------
+    drive : Drive
+    count : int
+        Evenly spaced knots from its start to its end.
+
+    Returns
+    -------
+    numpy.ndarray of bool, shape (count,)
+        Not those under whose hats a command changes, which may have come late, or never; nor
+        those at the start, with a state that nobody has measured.
+    """
+    knots = np.linspace(drive.start, drive.end, count)
+    moved = np.max(np.abs(np.diff(drive.logged.values, axis=0)), axis=1) > setting('still_speed')
+    changes = np.append(drive.start, drive.logged.times[1:][moved])
+    found: np.typing.NDArray[np.bool_] = np.min(np.abs(
+        knots[:, None] - changes[None, :]), axis=1) > knots[1] - knots[0]
+    return found
 
 
 def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
@@ -80,12 +107,15 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
     projection = Projection(fit)
     spacing = setting('effort_spacing')
     found = []
+    counts = [max(4, min(int((d.end - d.start) / spacing), int(setting('most_knots'))))
+              for d in evidence.drives]
+    steady = np.concatenate([steady_knots(d, n) for d, n in zip(
+        evidence.drives, counts, strict=True)])
     for balance, (row, *_) in BALANCES.items():
         blocks, sizes = [], []
         for place, (drive, whitener) in enumerate(zip(
                 evidence.drives, evidence.whiteners, strict=True)):
-            count = max(4, min(int((drive.end - drive.start) / spacing),
-                               int(setting('most_knots'))))
+            count = counts[place]
             times = probe_times(drive)
             pushed = np.zeros((times.size, 4, count))
             pushed[:, row] = hats(times, drive.start, drive.end, count)
@@ -100,16 +130,17 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
         for size, (_, block) in zip(sizes, blocks, strict=True):
             columns[top:top + block.shape[0], first:first + size] = block
             first, top = first + size, top + block.shape[0]
-        normal, slope = projection.problem(columns)
-        gain, values, deviations = log_evidence(normal, slope)
+        gain, explained, values, deviations = beyond_chance(evidence, fit, projection, columns)
         if BALANCES[balance][2] == 'none':
             # Those of the wheels burst with every command that comes a little late.
-            gain = max(gain, burst_evidence(slope / np.sqrt(np.maximum(np.diag(normal), 1e-12))))
+            normal, slope = projection.problem(columns[:, steady])
+            bursts = burst_evidence(slope / np.sqrt(np.maximum(np.diag(normal), 1e-12)))
+            gain, explained = max(gain, bursts), max(explained, bursts)
         first = 0
         for size, drive in zip(sizes, evidence.drives, strict=True):
             part = slice(first, first + size)
             found.append(Missing(balance, drive, np.linspace(drive.start, drive.end, size),
-                                 values[part], deviations[part], gain))
+                                 values[part], deviations[part], gain, explained))
             first += size
     return tuple(found)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import difflib
 import enum
 from functools import cache
+import math
 from typing import Any
 
 from lg_husky_sim.errors import ModelFileError, ParameterError
@@ -95,6 +96,9 @@ class EffectParameter:
     negligible : float
         How far from none of it a robot may be without anything missing from its model [unit]; 0
         where every size counts.
+    none_from : float
+        Of a limit or a stiffness: the size from which nothing is missing; estimates reach up to
+        twice that [unit].
     shapes : tuple of str
         Forms that have it; empty for all.
     linear : bool
@@ -111,6 +115,7 @@ class EffectParameter:
     source: str
     fixed: bool = False
     negligible: float = 0.0
+    none_from: float = math.inf
     shapes: tuple[str, ...] = ()
     linear: bool = False
     jitter: Mapping[str, str] = field(default_factory=dict)
@@ -289,8 +294,8 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
         EffectParameter(key, str(p['unit']), float(p['lower']), float(p['upper']),
                         tuple(float(s) for s in p['starts']), str(p['source']),
                         bool(p.get('fixed', False)), float(p.get('negligible', 0.0)),
-                        tuple(p.get('shapes', ())), bool(p.get('linear', False)),
-                        dict(p.get('jitter', {})))
+                        float(p.get('none_from', math.inf)), tuple(p.get('shapes', ())),
+                        bool(p.get('linear', False)), dict(p.get('jitter', {})))
         for key, p in entry['parameters'].items())
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),

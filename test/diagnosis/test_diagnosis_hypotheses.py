@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 import itertools
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, dispersion, is_beyond_chance
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
+from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Point
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -137,3 +138,24 @@ def test_a_delay_that_jitter_brings_is_not_called_missing(
     tried = Tried(one, fit, 50.0, evidence.count)
     assert not is_negligible(tried, quiet)
     assert is_negligible(tried, {**quiet, jitter: 0.02 / 12 ** 0.5})
+
+
+@pytest.mark.parametrize(('forward', 'yaw', 'nothing'), [
+    (12.0, 25.0, False), (3.0, 90.0, False), (35.0, 6.0, False), (35.0, 90.0, True)])
+def test_a_limit_of_acceleration_that_no_base_has_is_none(
+        setup: tuple[Evidence, Point], forward: float, yaw: float, nothing: bool) -> None:
+    evidence, start = setup
+    one = next(h for h in ALL if h.effect.id == 'command_slew' and h.effect.shape == 'both')
+    fit = evidence.fit(one.point(start, {'slew_forward': forward, 'slew_yaw': yaw}), rounds=0)
+    assert is_negligible(Tried(one, fit, 50.0, evidence.count), evidence.noise.values) is nothing
+
+
+@pytest.mark.parametrize(('stiffness', 'hold', 'nothing'), [
+    (20.0, 2.0, False), (1500.0, 2.0, False), (20.0, 50.0, False), (1500.0, 50.0, True)])
+def test_a_belt_that_is_stiff_and_holds_is_none(
+        setup: tuple[Evidence, Point], stiffness: float, hold: float, nothing: bool) -> None:
+    evidence, start = setup
+    one = next(h for h in ALL if h.effect.id == 'belt_compliance' and h.effect.shape == 'slipping')
+    fit = evidence.fit(one.point(start, {
+        'belt_stiffness': stiffness, 'belt_damping': 0.3, 'belt_hold': hold}), rounds=0)
+    assert is_negligible(Tried(one, fit, 50.0, evidence.count), evidence.noise.values) is nothing

@@ -7,9 +7,7 @@ Twice the gain of a hypothesis with k numbers is nearly chi-square distributed w
 freedom on a robot that lacks nothing; with n hypotheses tried, the largest of them exceeds a gain
 with a probability of at most n times that of one.
 
-Innovations that are not quite white make a gain larger by chance: by the ratio of the variance of
-its score ``c' e``, estimated from blocks of time that are independent of each other (sandwich), to
-the variance ``c' c`` of white ones.
+Innovations that are not quite white make a gain larger by chance, by their dispersion.
 """
 
 from __future__ import annotations
@@ -17,46 +15,7 @@ from __future__ import annotations
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.signals import FloatArray
-import numpy as np
 from scipy.stats import chi2
-
-
-def dispersion(evidence: Evidence, whitened: FloatArray, columns: FloatArray) -> float:
-    """
-    Return by how much twice a gain exceeds chi-square on the mean.
-
-    Parameters
-    ----------
-    evidence : Evidence
-    whitened : numpy.ndarray, shape (n,)
-        Innovations of all drives, in the order of time.
-    columns : numpy.ndarray, shape (n, k)
-        Whitened derivatives by the numbers of the hypothesis.
-
-    Returns
-    -------
-    float
-        At least what Student's t makes of white innovations.
-    """
-    nu = setting('student')
-    scores = columns * (whitened * (nu + 1.0) / (nu + whitened ** 2))[:, None]
-    meat = np.zeros((columns.shape[1], columns.shape[1]))
-    place = 0
-    for whitener in evidence.whiteners:
-        frame = whitener.frame
-        times = frame.times[frame.order]
-        part = scores[place:place + times.size]
-        place += times.size
-        block = ((times - times[0]) / setting('block')).astype(np.int64)
-        starts = np.flatnonzero(np.diff(block, prepend=-1))
-        sums = np.add.reduceat(part, starts, axis=0)
-        meat += sums.T @ sums
-    scale = np.sqrt(np.maximum(np.sum(columns ** 2, axis=0), 1e-300))
-    bread = columns.T @ columns / np.outer(scale, scale)
-    ratio = np.trace(np.linalg.pinv(bread, rcond=1e-9) @ (meat / np.outer(scale, scale)))
-    found: float = max(setting('inflation'), float(ratio) / columns.shape[1])
-    return found
 
 
 def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidence,
@@ -74,7 +33,7 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
     evidence : Evidence
         Its length says how many onsets were tried.
     inflation : float
-        Of twice the gain, see :func:`dispersion`.
+        Of twice the gain, see :func:`lg_husky_sim.diagnosis.evidence.dispersion.dispersion`.
 
     Returns
     -------

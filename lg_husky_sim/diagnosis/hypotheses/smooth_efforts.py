@@ -8,6 +8,8 @@ Gaussian c_k. With the whitened responses C of the hats (the numbers of the base
 what is left e, its log evidence against no effort, at the likeliest size s, is::
 
     max over s of  b' (G + I/s^2)^-1 b / 2 - ln det(I + s^2 G) / 2,   G = C'C,  b = C'e
+
+with the variance of the innovations along C as the effort leaves them, not that of white ones.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
 from lg_husky_sim.diagnosis.evidence.drives import Channel
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import Motion, probe_times
@@ -51,7 +54,9 @@ class Effort:
     argument : str
         Quantity that it is a function of.
     evidence : float
-        Log evidence against no effort [nats].
+        Log evidence against no effort, of innovations that are not quite white [nats].
+    explained : float
+        The same of white ones: what it explains beside an effect.
     low, high : float
         Range of the quantity [its unit].
     values, deviations : numpy.ndarray, shape (n_knots,)
@@ -61,6 +66,7 @@ class Effort:
     balance: str
     argument: str
     evidence: float
+    explained: float
     low: float
     high: float
     values: FloatArray
@@ -152,6 +158,39 @@ def log_evidence(normal: FloatArray, slope: FloatArray) -> tuple[float, FloatArr
     return best, vectors @ (turned * spread), np.sqrt((vectors ** 2) @ spread)
 
 
+def beyond_chance(evidence: Evidence, fit: Fit, projection: Projection, columns: FloatArray
+                  ) -> tuple[float, float, FloatArray, FloatArray]:
+    """
+    Return the log evidence of columns where innovations are not quite white.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    fit : Fit
+    projection : Projection
+        Of the fit.
+    columns : numpy.ndarray, shape (n, k)
+        Whitened responses.
+
+    Returns
+    -------
+    float
+        With the variance of what the columns leave: of G and b over the dispersion [nats].
+    float
+        As if they were white [nats].
+    numpy.ndarray, numpy.ndarray
+        Coefficients and their standard deviations, as of :func:`log_evidence`.
+    """
+    normal, slope = projection.problem(columns)
+    explained, values, deviations = log_evidence(normal, slope)
+    if explained <= 0.0:
+        return 0.0, 0.0, values, deviations
+    left = projection.apart(columns)
+    spread = dispersion(evidence, fit.whitened - left @ values, left)
+    gain, values, deviations = log_evidence(normal / spread, slope / spread)
+    return gain, explained, values, deviations
+
+
 def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     """
     Look for smooth efforts in what a fit leaves.
@@ -189,8 +228,9 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
             respond(pushed, probe_times(drive), frame.times, drive.channels, frame.order,
                     frame.cosine, frame.sine, whitener.model, setting('longest_step'), out)
             parts.append(whitener.apply(out))
-        gain, values, deviations = log_evidence(*projection.problem(np.concatenate(parts)))
-        return Effort(balance, argument, gain, low, high, values, deviations)
+        gain, explained, values, deviations = beyond_chance(
+            evidence, fit, projection, np.concatenate(parts))
+        return Effort(balance, argument, gain, explained, low, high, values, deviations)
     tasks = [(b, a) for b in BALANCES for a in (
         CHASSIS if BALANCES[b][2] == 'none' else WHEELS)]
     return tuple(sorted(evidence.pool.map(one_of, tasks), key=lambda e: -e.evidence))

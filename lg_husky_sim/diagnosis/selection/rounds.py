@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 import itertools
 import math
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, dispersion, is_beyond_chance
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
+from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, neutral_of, Numbers
@@ -237,14 +238,15 @@ def _chance(evidence: Evidence, tried: Tried, starts: int) -> float:
 
 
 def is_negligible(tried: Tried, jitter: Mapping[str, float]) -> bool:
-    """Return whether every number of a fitted effect is less than what counts."""
+    """Return whether every number of a fitted effect is too small, or too large, to count."""
     values, shape = tried.fit.point.values, tried.hypothesis.effect.shape
 
     def least(parameter: EffectParameter) -> float:
         of = parameter.jitter.get(shape)
         return max(parameter.negligible, setting('late_by_jitter') * jitter[of] if of
                    else 0.0)
-    return all(abs(values[p.name] - (neutral_of(p) or 0.0)) < least(p)
+    return all(values[p.name] >= p.none_from
+               or abs(values[p.name] - (neutral_of(p) or 0.0)) < least(p)
                for p in tried.hypothesis.free)
 
 

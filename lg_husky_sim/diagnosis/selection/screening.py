@@ -88,6 +88,12 @@ class Projection:
         normal = columns.T @ (columns * self._weights[:, None]) - explained.T @ explained
         return normal, self._target @ columns
 
+    def apart(self, columns: FloatArray) -> FloatArray:
+        """Return what is left of the columns themselves, shape (n, m)."""
+        found: FloatArray = columns - (self._base.T / self._weights[:, None]) @ (
+            self._base @ columns)
+        return found
+
     def problems(self, columns: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
         """
         Return the normal equations of many sets of columns at once.

@@ -1,0 +1,53 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How much larger than of white innovations gains are by chance.
+
+Innovations that are not quite white make a gain larger by chance: by the ratio of the variance of
+its score ``c' e``, estimated from blocks of time that are independent of each other (sandwich), to
+the variance ``c' c`` of white ones.
+"""
+
+from __future__ import annotations
+
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+
+def dispersion(evidence: Evidence, whitened: FloatArray, columns: FloatArray) -> float:
+    """
+    Return by how much twice a gain exceeds chi-square on the mean.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    whitened : numpy.ndarray, shape (n,)
+        Innovations of all drives, in the order of time.
+    columns : numpy.ndarray, shape (n, k)
+        Whitened derivatives by the numbers of the hypothesis.
+
+    Returns
+    -------
+    float
+        At least what Student's t makes of white innovations.
+    """
+    nu = setting('student')
+    scores = columns * (whitened * (nu + 1.0) / (nu + whitened ** 2))[:, None]
+    meat = np.zeros((columns.shape[1], columns.shape[1]))
+    place = 0
+    for whitener in evidence.whiteners:
+        frame = whitener.frame
+        times = frame.times[frame.order]
+        part = scores[place:place + times.size]
+        place += times.size
+        block = ((times - times[0]) / setting('block')).astype(np.int64)
+        starts = np.flatnonzero(np.diff(block, prepend=-1))
+        sums = np.add.reduceat(part, starts, axis=0)
+        meat += sums.T @ sums
+    scale = np.sqrt(np.maximum(np.sum(columns ** 2, axis=0), 1e-300))
+    bread = columns.T @ columns / np.outer(scale, scale)
+    ratio = np.trace(np.linalg.pinv(bread, rcond=1e-9) @ (meat / np.outer(scale, scale)))
+    found: float = max(setting('inflation'), float(ratio) / columns.shape[1])
+    return found

@@ -1,0 +1,90 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Physics without a name: smooth efforts and bursts, and what only looks like them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import beyond_chance
+from lg_husky_sim.diagnosis.localisation import steady_knots
+from lg_husky_sim.diagnosis.selection.screening import Projection
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import Recording
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope='module')
+def fitted(drive: Callable[..., Recording]) -> Iterator[tuple[Evidence, Fit]]:
+    """Return the evidence of one drive of a robot that lacks nothing, and its fit."""
+    drives, model = drives_of([drive('ahead', 'nothing', 1)]), load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with ThreadPoolExecutor(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        yield evidence, evidence.fit(start)
+
+
+def _with(fit: Fit, innovations: FloatArray) -> tuple[Fit, Projection]:
+    other = replace(fit, whitened=innovations)
+    return other, Projection(other)
+
+
+def test_an_effort_in_white_innovations_counts_for_all_that_it_explains(
+        fitted: tuple[Evidence, Fit]) -> None:
+    evidence, fit = fitted
+    rng = np.random.default_rng(3)
+    column = np.cos(np.linspace(0.0, 300.0, evidence.count))[:, None]
+    noise = rng.standard_normal(evidence.count)
+    other, projection = _with(fit, noise + 0.3 * column[:, 0])
+    gain, explained, values, deviations = beyond_chance(evidence, other, projection, column)
+    assert explained > 20.0
+    assert gain > 0.6 * explained
+    assert abs(values[0] - 0.3) < 4.0 * deviations[0]
+
+
+def test_an_effort_in_slow_innovations_counts_for_less(fitted: tuple[Evidence, Fit]) -> None:
+    """Noise that keeps its sign for a while looks like an effort that is slow as well."""
+    evidence, fit = fitted
+    times = evidence.whiteners[0].frame.times[evidence.whiteners[0].frame.order]
+    # Noise of one value for half a second each, across an effort of that speed.
+    part = ((times - times[0]) / 0.5).astype(np.int64)
+    chances = np.zeros((2, 20))
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        column = rng.standard_normal(int(part[-1]) + 1)[part][:, None]
+        noise = rng.standard_normal(int(part[-1]) + 1)[part]
+        other, projection = _with(fit, noise)
+        chances[:, seed] = beyond_chance(evidence, other, projection, column)[:2]
+    most = setting('unknown_alone')
+    assert np.count_nonzero(chances[1] > most) >= 5
+    assert np.count_nonzero(chances[0] > most) == 0
+
+
+def test_bursts_are_looked_for_where_the_drive_is_steady(fitted: tuple[Evidence, Fit]) -> None:
+    """A late command leaves a burst, and so does a start in motion."""
+    drive = fitted[0].drives[0]
+    count = 40
+    steady = steady_knots(drive, count)
+    knots = np.linspace(drive.start, drive.end, count)
+    spacing = knots[1] - knots[0]
+    assert not np.any(steady[:2])
+    assert np.any(steady)
+    steps = np.abs(np.diff(drive.logged.values, axis=0))
+    moments = drive.logged.times[1:][np.any(steps > setting('still_speed'), axis=1)]
+    assert moments.size
+    for moment in moments:
+        assert not np.any(steady[np.abs(knots - moment) <= spacing])
+    held = replace(drive, logged=replace(
+        drive.logged, values=np.zeros_like(drive.logged.values)))
+    assert np.array_equal(steady_knots(held, count), np.arange(count) > 1)
