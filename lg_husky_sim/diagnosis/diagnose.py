@@ -42,6 +42,7 @@ from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
+import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,6 +220,10 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
     if strained:
         notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(strained)
                      + '; check that the model is one of this robot')
+    periods = [d.clock.period for d in found.evidence.drives if d.clock is not None]
+    if periods:
+        notes.append('the base seems to apply commands at its own ticks, every '
+                     f'{1e3 * float(np.mean(periods)):.3g} ms, not when they come')
     values = found.evidence.noise.values
     notes.append(f'estimated disturbances (standard deviation): force {values["force"]:.2g} '
                  f'N, yaw moment {values["moment"]:.2g} N·m, torque on the wheels of each side '

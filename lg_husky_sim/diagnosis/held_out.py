@@ -9,6 +9,7 @@ import math
 
 from lg_husky_sim.comparison.metrics import channel_errors, pooled, SquareSum, tracking
 from lg_husky_sim.comparison.replay import replay
+from lg_husky_sim.diagnosis.evidence.base_clock import ticked_as
 from lg_husky_sim.diagnosis.evidence.drives import drive_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.selection.search import Search
@@ -112,7 +113,7 @@ def held_out_errors(found: Search, parts: Sequence[Segment]
         With what was found, its numbers from the other data.
     """
     train, test = split(parts)
-    drives = [d for d in map(drive_of, train) if d is not None]
+    drives = [ticked_as(d, found.evidence.drives) for d in map(drive_of, train) if d is not None]
     if not drives or not test:
         return {}, {}
     results = []

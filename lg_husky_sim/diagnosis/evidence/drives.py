@@ -43,6 +43,22 @@ UNITS = {Channel.WHEEL_LEFT: 'rad/s', Channel.WHEEL_RIGHT: 'rad/s', Channel.YAW_
          Channel.ANGLE_RIGHT: 'rad'}
 
 
+@dataclass(frozen=True)
+class Clock:
+    """
+    When a base ticks in one drive, and how much later than that, against the log, commands act.
+
+    Parameters
+    ----------
+    period, phase, late : float
+        [s]
+    """
+
+    period: float
+    phase: float
+    late: float
+
+
 @dataclass(frozen=True, eq=False)
 class Drive:
     """
@@ -80,9 +96,11 @@ class Drive:
     stamped : bool
         Whether the commands carry stamps of their own, and not only the time of their receipt.
     logged : TimeSeries
-        Commands as they were logged.
+        Commands as they were logged, or as a base that ticks applied them.
     rounding : numpy.ndarray, shape (n,)
         Variance by which each reading is rounded [its unit squared].
+    clock : Clock, optional
+        Of a base that applies commands at its own ticks, not when they come.
     """
 
     recording: str
@@ -106,11 +124,17 @@ class Drive:
     stamped: bool = True
     logged: TimeSeries = field(kw_only=True)
     rounding: FloatArray = field(kw_only=True)
+    clock: Clock | None = None
 
     @property
     def name(self) -> str:
         """Recording and number of the segment."""
         return f'{self.recording}/{self.index}'
+
+    @property
+    def late(self) -> str:
+        """Name of how much later than at the likeliest phase its base ticks."""
+        return f'tick_delay {self.name}'
 
     def remembered(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
         """Return what was made of this drive under a key, among the last few; else make it."""

@@ -209,6 +209,10 @@ class Evidence:
         return float(np.sum(0.5 * (nu + 1.0) * np.log1p(whitened * whitened / nu))
                      + 0.5 * np.sum(point.strain ** 2))
 
+    def surprise(self, fit: Fit) -> float:
+        """Return the cost of a fit under this noise, comparable under any noise [nats]."""
+        return fit.cost + sum(float(np.sum(np.log(w.scale))) for w in self.whiteners)
+
     def derivatives(self, point: Point, predicted: Sequence[FloatArray],
                     which: Sequence[int]) -> list[FloatArray]:
         """Return derivatives of the readings of each drive by some of the places."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.observation import (
+    command_lag,
     Motion,
     probe_times,
     Reading,
@@ -124,7 +125,7 @@ def _steps(drive: Drive, plant: Plant, reading: Reading, reach: float) -> FloatA
         values[:, 0], -stage.limit_forward, stage.limit_forward)
     turn = stage.volts_per_rate * np.clip(values[:, 1], -stage.limit_yaw, stage.limit_yaw)
     steps = np.diff(np.column_stack([forward - turn, forward + turn]), axis=0)
-    times = drive.commands.times[1:] + reading.get('command_delay') + stage.latency
+    times = drive.commands.times[1:] + command_lag(drive, reading) + stage.latency
     moved = np.any(steps != 0.0, axis=1)
     return np.column_stack([times, np.zeros((times.size, 2)), steps,
                             np.full(times.size, reach)])[moved]

@@ -49,7 +49,8 @@ class Reading:
         ``wheel_window`` [s] (length of the window, or time constant of the low pass),
         ``imu_window`` [s] (length of the window of a yaw rate; its period if not given),
         ``delay_wheels``, ``delay_imu``, ``delay_pose`` [s] (how late stamps are),
-        ``command_delay`` [s] (how late the base applies commands), ``gyro_offset`` [rad/s],
+        ``command_delay`` [s] (how late the base applies commands), :attr:`Drive.late` [s] (how
+        much later than that in one drive), ``gyro_offset`` [rad/s],
         ``gyro_gain`` [1] (relative), ``pose_turn`` [rad] (heading of the pose's frame against the
         direction of travel), ``pose_lever`` [m] (how far ahead of the middle it is).
     """
@@ -143,6 +144,11 @@ def probe_times(drive: Drive) -> FloatArray:
     return np.linspace(drive.start, drive.end, count)
 
 
+def command_lag(drive: Drive, reading: Reading) -> float:
+    """Return how late the commands of a drive act [s]."""
+    return reading.get('command_delay') + reading.get(drive.late)
+
+
 def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bool) -> Wanted:
     wheels: FloatArray = drive.wheel_times - delays[0]
     imu: FloatArray = drive.imu_times - delays[1]
@@ -173,7 +179,7 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
         parts[name] = slice(place, place + times.size)
         place += times.size
     times = np.maximum(np.concatenate(list(groups.values())), drive.start)
-    delay = reading.get('command_delay')
+    delay = command_lag(drive, reading)
     commands = drive.commands if delay == 0.0 else TimeSeries(
         drive.commands.times + delay, drive.commands.values, drive.commands.names)
     events = Events(commands, times, start=drive.start)
@@ -206,7 +212,7 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
     # A low pass follows the motion wherever its time constant.
     window = reading.get('wheel_window') if reading.wheels is not WheelReading.FILTERED else 0.0
     key = (reading.wheels, reading.imu, window,
-           reading.values.get('imu_window'), reading.get('command_delay'), delays, probe)
+           reading.values.get('imu_window'), command_lag(drive, reading), delays, probe)
     wanted = drive.remembered(key, lambda: _wanted(drive, reading, delays, probe))
     rows = drive.rows((key, _signature(plant)), lambda: _driven(plant, drive, wanted.events))
     events = wanted.events

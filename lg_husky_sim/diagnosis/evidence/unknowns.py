@@ -40,6 +40,9 @@ class Unknown:
         Bounds on that scale.
     step : float
         Step of a difference quotient on that scale.
+    own, room : float
+        Of a delay: its deviation, and how far its bounds are from the centre, if no stamp jitters
+        [s].
     """
 
     name: str
@@ -50,6 +53,8 @@ class Unknown:
     lower: float
     upper: float
     step: float
+    own: float = 0.0
+    room: float = 0.0
 
     def value(self, place: float) -> float:
         """Return the number at a place on the scale [its unit]."""
@@ -76,6 +81,28 @@ def log_unknown(name: str, centre: float, deviation: float, lower: float, upper:
     return Unknown(name, 'log', False, centre, deviation, lower, upper, 0.2 * deviation)
 
 
+def delay_unknown(name: str, centre: float, deviation: float, period: float) -> Unknown:
+    """
+    Return a delay as an unknown.
+
+    Parameters
+    ----------
+    name : str
+    centre, deviation : float
+        Gaussian prior of what its transport takes [s].
+    period : float
+        Of its stream [s]: a stamp stands for some moment of it, any alike.
+
+    Returns
+    -------
+    Unknown
+    """
+    own = math.hypot(deviation, period / math.sqrt(12.0))
+    room = 0.5 * period + setting('log_reach') * deviation
+    return Unknown(name, 'log', False, centre, own, centre - room, centre + room,
+                   0.2 * deviation, own, room)
+
+
 def window_unknown(name: str, usual: float, longest: float) -> Unknown:
     """Return the length of the window over which a rate is taken as an unknown."""
     return Unknown(name, 'log', True, math.log(usual), setting('window_spread'),
@@ -85,15 +112,16 @@ def window_unknown(name: str, usual: float, longest: float) -> Unknown:
 
 def effect_unknown(parameter: EffectParameter, start: float) -> Unknown:
     """Return a number of an effect as an unknown; most positive ones on a logarithmic scale."""
+    upper = min(parameter.upper, 2.0 * parameter.none_from)
     positive = parameter.lower >= 0.0 and parameter.name not in NEUTRAL and not parameter.linear
     if positive:
         least = max(parameter.lower, 1e-4 * abs(start))
         return Unknown(parameter.name, 'effect', True, math.log(abs(start)), math.inf,
-                       math.log(least), math.log(parameter.upper), setting('effect_step'))
+                       math.log(least), math.log(upper), setting('effect_step'))
     size = parameter.starts[0] if parameter.linear else abs(
         start - NEUTRAL.get(parameter.name, 0.0))
     return Unknown(parameter.name, 'effect', False, start, math.inf, parameter.lower,
-                   parameter.upper, setting('effect_step') * max(size, 1e-9))
+                   upper, setting('effect_step') * max(size, 1e-9))
 
 
 def effect_unknowns(effect: Effect, start: Mapping[str, float]) -> tuple[Unknown, ...]:
@@ -121,28 +149,41 @@ def base_unknowns(parameters: Parameters, drives: Sequence[Drive]) -> tuple[Unkn
     wheels = any(d.wheel_times.size for d in drives)
     gyro = any(d.imu_times.size for d in drives)
     pose = any(d.pose_times.size for d in drives)
-    offset = setting('stamp_offset')
 
     def add(name: str, deviation: float, centre: float = 0.0) -> None:
         reach = setting('log_reach') * deviation
         found.append(log_unknown(name, centre, deviation, centre - reach, centre + reach))
+
+    def late_by(name: str, streams: Sequence[FloatArray]) -> None:
+        # Any moment of its period may be the one that a stamp stands for.
+        period = max((float(np.median(np.diff(t))) for t in streams if t.size > 1), default=0.0)
+        found.append(delay_unknown(name, 0.0, setting('stamp_offset'), period))
     late = setting('transport') if all(d.stamped for d in drives) else -setting('receipt')
-    add('command_delay', setting('transport_spread'), late)
+    found.append(delay_unknown('command_delay', late, setting('transport_spread'),
+                               setting('base_period')))
     if wheels:
-        add('delay_wheels', offset)
+        late_by('delay_wheels', [d.wheel_times for d in drives])
         if any(d.wheel_times.size and not d.counted for d in drives):
             found.append(window_unknown('wheel_window', setting('wheel_window'),
                                         setting('longest_window')))
     if gyro:
-        add('delay_imu', offset)
+        late_by('delay_imu', [d.imu_times for d in drives])
         add('gyro_offset', setting('gyro_offset'))
         if pose:
             add('gyro_gain', setting('gyro_gain'))
     if pose:
-        add('delay_pose', offset)
+        late_by('delay_pose', [d.pose_times for d in drives])
         add('pose_turn', setting('pose_turn'))
         add('pose_lever', setting('pose_lever'))
     return tuple(found)
+
+
+def tick_unknowns(drives: Sequence[Drive]) -> tuple[Unknown, ...]:
+    """Return how much later than at the likeliest phase the base ticks, in each drive."""
+    return tuple(
+        log_unknown(d.late, 0.0, own, -0.5 * d.clock.period, 0.5 * d.clock.period)
+        for d in drives if d.clock is not None
+        for own in (setting('clock_phase') * d.clock.period,))
 
 
 def loosened(unknowns: Sequence[Unknown], jitter: Mapping[str, float]) -> tuple[Unknown, ...]:
@@ -165,11 +206,10 @@ def loosened(unknowns: Sequence[Unknown], jitter: Mapping[str, float]) -> tuple[
     found = []
     for one in unknowns:
         if one.kind == 'log' and one.name in jitter:
-            own = setting('transport_spread' if one.name == 'command_delay' else 'stamp_offset')
-            deviation = math.hypot(own, setting('late_by_jitter') * jitter[one.name])
-            reach = setting('log_reach') * deviation
-            one = replace(one, deviation=deviation, lower=one.centre - reach,
-                          upper=one.centre + reach, step=0.2 * own)
+            late = setting('late_by_jitter') * jitter[one.name]
+            reach = math.hypot(one.room, setting('log_reach') * late)
+            one = replace(one, deviation=math.hypot(one.own, late), lower=one.centre - reach,
+                          upper=one.centre + reach)
         found.append(one)
     return tuple(found)
 

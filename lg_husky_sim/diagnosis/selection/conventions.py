@@ -66,7 +66,7 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     if best.cost > same.cost - setting('reading_gain'):
         return fit if same.cost > fit.cost - setting('reading_gain') else same
     unknown = window_unknown(window, best.point.log.values.get(window, 0.0) or setting(
-        'shortest_window'), setting('longest_imu_window'))
+        'shortest_window'), max(setting('longest_imu_window'), _imu_period(evidence)))
     if best.point.reading.imu is None or any(u.name == window for u in best.point.unknowns):
         return evidence.fit(best.point, best.slopes, rounds=3)
     # The length of a window that was not read before is one more number.
@@ -85,7 +85,9 @@ def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
         weight = (nu + 1.0) / (nu + e * e)
         normal = (fit.jacobian * weight[:, None]).T @ fit.jacobian + np.diag(point.weights ** 2)
         slope = fit.jacobian.T @ (weight * e) - point.weights * point.strain
-        return evidence.cost(e, point) - 0.5 * float(slope @ np.linalg.solve(normal, slope))
+        # A number that acts nowhere, of an effect without a prior, may leave it singular.
+        move = np.linalg.lstsq(normal, slope, rcond=None)[0]
+        return evidence.cost(e, point) - 0.5 * float(slope @ move)
     return promise
 
 
@@ -93,8 +95,7 @@ def _read_so(evidence: Evidence, fit: Fit, reading: Reading) -> Point:
     # With as late a stream on the whole as before: what the reading is late, its stamps are not.
     now = fit.point.log
     other = replace(reading, values={**now.values, **reading.values})
-    period = _period([d.imu_times for d in evidence.drives if d.imu_times.size > 3] or [
-        np.zeros(2)])
+    period = _imu_period(evidence)
     spared = {'delay_wheels': wheel_lag(now) - wheel_lag(other),
               'delay_imu': imu_lag(now, period) - imu_lag(other, period)}
     places = np.array([
@@ -103,6 +104,10 @@ def _read_so(evidence: Evidence, fit: Fit, reading: Reading) -> Point:
         else place + spared.get(u.name, 0.0)
         for u, place in zip(fit.point.unknowns, fit.point.places, strict=True)])
     return replace(fit.point, reading=reading).at(places)
+
+
+def _imu_period(evidence: Evidence) -> float:
+    return _period([d.imu_times for d in evidence.drives if d.imu_times.size > 3] or [np.zeros(2)])
 
 
 def _period(times: Sequence[FloatArray]) -> float:
@@ -129,5 +134,5 @@ def _imu_options(evidence: Evidence, now: Reading) -> list[Reading]:
     if not times:
         return []
     return [replace(now, imu=place).replacing({'imu_window': window})
-            for window in (0.01, 0.04, round(_period(times), 4))
+            for window in sorted({0.01, setting('longest_imu_window'), round(_period(times), 4)})
             for place in (0.0, 0.5, 1.0, 0.5 - 1.0 / math.sqrt(12.0))]

@@ -7,9 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
+from lg_husky_sim.diagnosis.evidence.base_clock import ticking
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit, Point
 from lg_husky_sim.diagnosis.evidence.observation import Reading
-from lg_husky_sim.diagnosis.evidence.unknowns import start_of
+from lg_husky_sim.diagnosis.evidence.unknowns import start_of, tick_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.elimination import eliminated
@@ -102,6 +103,41 @@ def _seeds(evidence: Evidence, rough: Fit, base: Fit, early: Sequence[Tried]) ->
     return [Tried(one, fit, own.fit(base.point).cost - fit.cost, own.count)]
 
 
+@dataclass(frozen=True, eq=False)
+class _Recalibrated:
+    """The model as it is, with the noise and the reading of the log."""
+
+    first: Evidence
+    rough: Fit
+    early: Sequence[Tried]
+    evidence: Evidence
+    base: Fit
+
+
+def _recalibrated(evidence: Evidence, start: Point) -> _Recalibrated:
+    # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
+    rough = evidence.fit(start, rounds=1)
+    chosen, early = _as_logged(evidence, rough)
+    start = _nominal(chosen.point)
+    return _Recalibrated(evidence, rough, early, *calibrated(evidence.about(start), start))
+
+
+def _at_ticks(known: _Recalibrated, start: Point, progress: Progress) -> _Recalibrated | None:
+    # The same of a base that applies commands at its own ticks, if that is why they jitter.
+    drives = ticking(known.evidence, known.base)
+    if drives is None:
+        return None
+    progress('a base that ticks', 0.08)
+    first = known.first
+    own = tick_unknowns(drives)
+    start = replace(start, unknowns=(*start.unknowns, *own),
+                    places=np.append(start.places, start_of(own)))
+    other = _recalibrated(evidence_of(drives, first.names, start, first.noise, first.pool), start)
+    before, after = (one.evidence.noise.values['command_jitter'] for one in (known, other))
+    gains = known.evidence.surprise(known.base) > other.evidence.surprise(other.base)
+    return other if gains and after ** 2 < setting('clock_left') * before ** 2 else None
+
+
 def _nominal(point: Point) -> Point:
     # The robot as it should be, read like a point.
     centres = start_of(point.unknowns)
@@ -129,12 +165,12 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     Search
     """
     progress('recalibration', 0.05)
-    # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
-    first, rough = evidence, evidence.fit(start, rounds=1)
-    chosen, early = _as_logged(evidence, rough)
-    start = _nominal(chosen.point)
-    evidence, base = calibrated(evidence.about(start), start)
-    seeds = _seeds(first, rough, base, early)
+    known = _recalibrated(evidence, start)
+    ticked = _at_ticks(known, start, progress)
+    if ticked is not None:
+        known = ticked
+    evidence, base = known.evidence, known.base
+    seeds = _seeds(known.first, known.rough, base, known.early)
     chosen, better = _as_logged(evidence, base)
     if seeds and seeds[0].gain > _promised(base, chosen):
         chosen, better = base, seeds

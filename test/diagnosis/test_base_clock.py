@@ -1,0 +1,104 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A base that applies commands at its own ticks: found from when its wheels follow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
+
+from lg_husky_sim.comparison.output import simulate_commands
+from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.evidence.base_clock import at_ticks, steps_of, ticking
+from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import beginning, evidence_of
+from lg_husky_sim.diagnosis.evidence.noise import first_guess, Noise
+from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.manoeuvres import Manoeuvre, Step
+from lg_husky_sim.recording import Recording
+from lg_husky_sim.signals import TimeSeries
+import numpy as np
+import pytest
+
+PERIOD = 0.073
+Made = Callable[[str, float, int], Recording]
+
+
+@pytest.fixture
+def made(steps: Sequence[tuple[float, float, float]]) -> Made:
+    """Return a function that records a base which ticks with a period, 0 for not at all."""
+    def record(name: str, period: float, seed: int) -> Recording:
+        rng = np.random.default_rng(seed)
+        model = load_model()
+        plant = compile_model(model.structure).at(model.parameters)
+        asked = Manoeuvre(name, tuple(Step(t, v, w, 0.6) for t, v, w in steps)).commands()
+        sent = TimeSeries(asked.times + rng.uniform(0.0, 0.01, asked.times.size), asked.values,
+                          asked.names)
+        got = at_ticks(sent, period, 0.011 * seed) if period else sent
+        streams = simulate_commands(plant, got, 1.0)
+        noise = {'wheels': 0.02, 'imu': 0.005, 'pose': 0.003}
+        read = {key: TimeSeries(
+            streams[key].times, streams[key].values + level * rng.standard_normal(
+                streams[key].values.shape), streams[key].names) for key, level in noise.items()}
+        return Recording(name, name, {'command': sent, **read}, 0, frames=('odom', 'base_link'))
+    return record
+
+
+@pytest.fixture
+def pool() -> Iterator[Executor]:
+    """Return one thread."""
+    with ThreadPoolExecutor(1) as threads:
+        yield threads
+
+
+def test_commands_wait_for_the_next_tick_and_the_last_one_counts() -> None:
+    commands = TimeSeries(np.array([0.01, 0.03, 0.05, 0.1]), np.array([[1.0, 2.0, 3.0, 4.0]]).T,
+                          ('forward',))
+    held = at_ticks(commands, 0.05, 0.0)
+    np.testing.assert_allclose(held.times, [0.05, 0.1])
+    np.testing.assert_array_equal(held.values[:, 0], [3.0, 4.0])
+
+
+def test_the_period_of_a_base_is_found_from_two_drives(made: Made, pool: Executor) -> None:
+    recordings = [made('one', PERIOD, 1), made('two', PERIOD, 2)]
+    drives, model = drives_of(recordings), load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    guess = first_guess(drives)
+    noise = Noise({**guess.values, 'command_jitter': 0.02})
+    evidence = evidence_of(drives, ['one', 'two'], start, noise, pool)
+    found = ticking(evidence, evidence.fit(start, rounds=3))
+    assert found is not None
+    for number, (drive, recording) in enumerate(zip(found, recordings, strict=True), 1):
+        assert drive.clock is not None
+        assert drive.clock.period == pytest.approx(PERIOD, rel=2e-4)
+        true = at_ticks(recording.streams['command'], PERIOD, 0.011 * number)
+        apart = np.abs(drive.commands.times[:, None] - true.times).min(axis=1)
+        assert np.quantile(apart, 0.9) < 0.004
+    quiet = evidence_of(drives, ['one', 'two'], start, replace(guess, values={
+        **guess.values, 'command_jitter': 1e-4}), pool)
+    assert ticking(quiet, quiet.fit(start, rounds=1)) is None
+
+
+def test_delays_of_single_steps_are_those_to_the_next_tick(made: Made) -> None:
+    """As far as they are linear; their phase is that of the base."""
+    drive = drives_of([made('one', PERIOD, 1)])[0]
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    known = steps_of(plant, drive, Reading(values={'command_delay': 0.5 * PERIOD}), 0.02)
+    assert known is not None
+    assert np.corrcoef(np.mod(0.011 - known.stamps, PERIOD), known.delays)[0, 1] > 0.8
+    clock = known.clock(np.array([PERIOD]), 40)
+    assert abs(np.mod(clock.phase - 0.011 + 0.5 * PERIOD, PERIOD) - 0.5 * PERIOD) < 0.1 * PERIOD
+
+
+def test_a_clean_base_that_ticks_lacks_nothing(made: Made) -> None:
+    said = diagnose([made('one', PERIOD, 1), made('two', PERIOD, 2)], load_model(),
+                    lambda text, share: None).diagnosis
+    assert said.verdict is Verdict.NOTHING_MISSING
+    assert any('ticks, every 73 ms' in note for note in said.notes)
