@@ -10,8 +10,9 @@ import numpy as np
 #: Below these a base is at rest, as far as sensors with noise can tell: its forward speed [m/s]
 #: and yaw rate [rad/s], and the rates of its wheels [rad/s].
 SLOW, SLOW_WHEEL = 0.05, 0.3
-#: A first command that comes so soon after a start is in force there already [s].
-SOON = 0.01
+#: A moving base has been told already what comes so soon after a start: bases forget commands that
+#: are older than this [s].
+SOON = 0.5
 
 
 def at_rest(twist: BodyTwist, wheel_rates: tuple[float, float] | None = None) -> bool:

@@ -22,8 +22,8 @@ ROLLING = BodyTwist(0.5, 0.0)
 
 @pytest.mark.parametrize(('start', 'wanted'), [
     (2.5, (0.5, -0.4)), (3.0, (0.8, 0.0)), (9.0, (0.8, 0.0)),
-    (0.995, (0.2, 0.1)),  # it comes within the first step
-    (0.9, (0.0, 0.0))])
+    (0.995, (0.2, 0.1)), (0.6, (0.2, 0.1)),  # it has had one like it: bases forget older ones
+    (0.4, (0.0, 0.0))])
 def test_a_base_that_moves_follows_the_command_in_force(
         start: float, wanted: tuple[float, float]) -> None:
     assert commanded_until(start, TOLD, ROLLING) == BodyTwist(*wanted)

@@ -30,6 +30,10 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
+#: Where a mean over a window of sqrt(12) time constants has to be, against the stamp, to be as late
+#: and as long as a low pass.
+_LOW_PASS = 0.5 - 1.0 / math.sqrt(12.0)
+
 
 def best_reading(evidence: Evidence, fit: Fit) -> Fit:
     """
@@ -66,7 +70,7 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     if best.cost > same.cost - setting('reading_gain'):
         return fit if same.cost > fit.cost - setting('reading_gain') else same
     unknown = window_unknown(window, best.point.log.values.get(window, 0.0) or setting(
-        'shortest_window'), max(setting('longest_imu_window'), _imu_period(evidence)))
+        'shortest_window'), _longest(best.point.reading.imu, _imu_period(evidence)))
     if best.point.reading.imu is None or any(u.name == window for u in best.point.unknowns):
         return evidence.fit(best.point, best.slopes, rounds=3)
     # The length of a window that was not read before is one more number.
@@ -133,6 +137,14 @@ def _imu_options(evidence: Evidence, now: Reading) -> list[Reading]:
     times = [d.imu_times for d in evidence.drives if d.imu_times.size > 3]
     if not times:
         return []
+    period = round(_period(times), 4)
     return [replace(now, imu=place).replacing({'imu_window': window})
-            for window in sorted({0.01, setting('longest_imu_window'), round(_period(times), 4)})
-            for place in (0.0, 0.5, 1.0, 0.5 - 1.0 / math.sqrt(12.0))]
+            for place in (0.0, 0.5, 1.0, _LOW_PASS)
+            for window in (0.01, 0.04, period) if window <= _longest(place, period)]
+
+
+def _longest(place: float | None, period: float) -> float:
+    # A mean ends within its period or so; a low pass may last longer.
+    if place == _LOW_PASS:
+        return math.sqrt(12.0) * setting('slowest_gyro')
+    return max(setting('longest_imu_window'), period)

@@ -117,6 +117,8 @@ class _Recalibrated:
 def _recalibrated(evidence: Evidence, start: Point) -> _Recalibrated:
     # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
     rough = evidence.fit(start, rounds=1)
+    evidence = evidence.renoised(rough)
+    rough = evidence.fit(start, rounds=2)
     chosen, early = _as_logged(evidence, rough)
     start = _nominal(chosen.point)
     return _Recalibrated(evidence, rough, early, *calibrated(evidence.about(start), start))
