@@ -97,8 +97,8 @@ class EffectParameter:
         How far from none of it a robot may be without anything missing from its model [unit]; 0
         where every size counts.
     none_from : float
-        Of a limit or a stiffness: the size from which nothing is missing; estimates reach up to
-        twice that [unit].
+        Of a limit or a stiffness: the size from which nothing is missing; estimates reach a little
+        further [unit].
     shapes : tuple of str
         Forms that have it; empty for all.
     linear : bool

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import itertools
 
 from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
-from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
+from lg_husky_sim.diagnosis.evidence.dispersion import accident, dispersion
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Point
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -17,9 +17,11 @@ from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, neutral_of
 from lg_husky_sim.diagnosis.selection.rounds import is_negligible, Tried
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
+from lg_husky_sim.signals import FloatArray
 import numpy as np
 import pytest
 
@@ -66,6 +68,22 @@ def test_noise_that_is_correlated_makes_gains_larger_by_chance(
         evidence.count // 100 + 1), 100)[:evidence.count], columns) for _ in range(20)]
     assert np.mean(white) < 1.5
     assert np.mean(slow) > 5.0
+
+
+def test_what_is_gained_within_one_stretch_is_an_accident(
+        setup: tuple[Evidence, Point]) -> None:
+    """A stretch that one innovation stands out of explains itself; a lasting effect does not."""
+    evidence, nu = setup[0], setting('student')
+    quiet = np.zeros(evidence.count)
+    kicked, lasting = quiet.copy(), quiet.copy()
+    kicked[evidence.count // 2:evidence.count // 2 + 10] = 4.0
+    lasting[::evidence.count // 200] = 4.0
+
+    def gained(innovations: FloatArray) -> float:
+        return 0.5 * (nu + 1.0) * float(np.sum(np.log1p(innovations ** 2 / nu)))
+    assert accident(evidence, kicked, quiet) == pytest.approx(gained(kicked))
+    assert accident(evidence, lasting, quiet) < 0.5 * gained(lasting)
+    assert accident(evidence, quiet, kicked) == 0.0
 
 
 @pytest.mark.parametrize('taken', ['slope', 'gyro_scale', 'command_slew', 'coulomb_drivetrain'])

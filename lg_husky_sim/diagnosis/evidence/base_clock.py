@@ -274,10 +274,12 @@ class Ticker:
     log: Reading
     steps: Steps
 
-    def cost(self, clock: Clock) -> float:
-        """Return the negative log likelihood of the rates, up to a constant [nats]."""
-        held = _ticked(self.drive, clock)
-        log = self.log.replacing({'command_delay': self.log.get('command_delay') + clock.late})
+    def cost(self, clock: Clock | None) -> float:
+        """Return the negative log likelihood of rates with a clock or none, to a constant."""
+        held, log = self.drive, self.log
+        if clock is not None:
+            held = _ticked(held, clock)
+            log = log.replacing({'command_delay': log.get('command_delay') + clock.late})
         left = _scaled(_rated(held, held.measured - observe(
             simulate(self.plant, held, log), held, log)), self.steps.scales)
         nu = setting('student')
@@ -333,7 +335,8 @@ def ticking(evidence: Evidence, fit: Fit) -> list[Drive] | None:
     Returns
     -------
     list of Drive or None
-        None where commands jitter too little for it, are at ticks already, or no drive tells.
+        None where commands jitter too little for it, are at ticks already, no drive tells, or
+        rates are likelier without ticks.
         Whether these ticks make the drives likelier than none is for a fit to say.
     """
     spread = evidence.noise.values['command_jitter']
@@ -349,4 +352,6 @@ def ticking(evidence: Evidence, fit: Fit) -> list[Drive] | None:
     if not tickers:
         return None
     clocks = dict(zip(tickers, likeliest(list(tickers.values())), strict=True))
+    if sum(t.cost(clocks[k]) - t.cost(None) for k, t in tickers.items()) >= 0.0:
+        return None
     return [_ticked(drive, clocks[k]) if k in clocks else drive for k, drive in enumerate(plain)]

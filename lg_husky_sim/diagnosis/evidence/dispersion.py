@@ -1,7 +1,7 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How much larger than of white innovations gains are by chance.
+How much larger than of white innovations gains are by chance, and what of one happened once.
 
 Innovations that are not quite white make a gain larger by chance: by the ratio of the variance of
 its score ``c' e``, estimated from blocks of time that are independent of each other (sandwich), to
@@ -35,19 +35,43 @@ def dispersion(evidence: Evidence, whitened: FloatArray, columns: FloatArray) ->
     """
     nu = setting('student')
     scores = columns * (whitened * (nu + 1.0) / (nu + whitened ** 2))[:, None]
-    meat = np.zeros((columns.shape[1], columns.shape[1]))
-    place = 0
-    for whitener in evidence.whiteners:
-        frame = whitener.frame
-        times = frame.times[frame.order]
-        part = scores[place:place + times.size]
-        place += times.size
-        block = ((times - times[0]) / setting('block')).astype(np.int64)
-        starts = np.flatnonzero(np.diff(block, prepend=-1))
-        sums = np.add.reduceat(part, starts, axis=0)
-        meat += sums.T @ sums
+    sums = _over_blocks(evidence, scores, setting('block'))
+    meat = sums.T @ sums
     scale = np.sqrt(np.maximum(np.sum(columns ** 2, axis=0), 1e-300))
     bread = columns.T @ columns / np.outer(scale, scale)
     ratio = np.trace(np.linalg.pinv(bread, rcond=1e-9) @ (meat / np.outer(scale, scale)))
     found: float = max(setting('inflation'), float(ratio) / columns.shape[1])
     return found
+
+
+def accident(evidence: Evidence, before: FloatArray, after: FloatArray) -> float:
+    """
+    Return what innovations gain in the one stretch of time in which they gain most.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    before, after : numpy.ndarray, shape (n,)
+        Innovations of all drives, in the order of time.
+
+    Returns
+    -------
+    float
+        [nats]
+    """
+    nu = setting('student')
+    gains = 0.5 * (nu + 1.0) * (np.log1p(before ** 2 / nu) - np.log1p(after ** 2 / nu))
+    return max(0.0, float(np.max(_over_blocks(evidence, gains, setting('accident')))))
+
+
+def _over_blocks(evidence: Evidence, values: FloatArray, length: float) -> FloatArray:
+    # Sums over stretches of so many seconds of each drive.
+    found, place = [], 0
+    for whitener in evidence.whiteners:
+        frame = whitener.frame
+        times = frame.times[frame.order]
+        block = ((times - times[0]) / length).astype(np.int64)
+        starts = np.flatnonzero(np.diff(block, prepend=-1))
+        found.append(np.add.reduceat(values[place:place + times.size], starts, axis=0))
+        place += times.size
+    return np.concatenate(found)

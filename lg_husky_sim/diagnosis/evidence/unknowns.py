@@ -112,7 +112,7 @@ def window_unknown(name: str, usual: float, longest: float) -> Unknown:
 
 def effect_unknown(parameter: EffectParameter, start: float) -> Unknown:
     """Return a number of an effect as an unknown; most positive ones on a logarithmic scale."""
-    upper = min(parameter.upper, 2.0 * parameter.none_from)
+    upper = min(parameter.upper, setting('none_reach') * parameter.none_from)
     positive = parameter.lower >= 0.0 and parameter.name not in NEUTRAL and not parameter.linear
     if positive:
         least = max(parameter.lower, 1e-4 * abs(start))

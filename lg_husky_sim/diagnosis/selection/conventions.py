@@ -30,8 +30,8 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Where a mean over a window of sqrt(12) time constants has to be, against the stamp, to be as late
-#: and as long as a low pass.
+#: Where a mean over a window of sqrt(12) time constants has to be, against the stamp, to be as
+#: late and as long as a low pass.
 _LOW_PASS = 0.5 - 1.0 / math.sqrt(12.0)
 
 

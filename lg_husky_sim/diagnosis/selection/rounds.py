@@ -15,7 +15,7 @@ import itertools
 import math
 
 from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
-from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
+from lg_husky_sim.diagnosis.evidence.dispersion import accident, dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, neutral_of, Numbers
@@ -203,10 +203,13 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     tried = [_best_form(evidence, base, t) for t in tried[:2]] + tried[2:]
-    tried.sort(key=lambda t: (is_negligible(t, evidence.noise.values), -t.score))
+    once = {id(t.fit): accident(evidence, base.whitened, t.fit.whitened) for t in tried}
+    tried.sort(key=lambda t: (is_negligible(t, evidence.noise.values),
+                              once[id(t.fit)] - t.score))
     tried = _from_the_start(evidence, base, tried)
     best = tried[0]
-    chance = 1.0 if is_negligible(best, evidence.noise.values) else _chance(evidence, best, starts)
+    chance = 1.0 if is_negligible(best, evidence.noise.values) else _chance(
+        evidence, best, starts, accident(evidence, base.whitened, best.fit.whitened))
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
 
 
@@ -231,9 +234,10 @@ def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[T
     return [again, *(t for t in tried[1:] if t.hypothesis.effect != again.hypothesis.effect)]
 
 
-def _chance(evidence: Evidence, tried: Tried, starts: int) -> float:
+def _chance(evidence: Evidence, tried: Tried, starts: int, once: float = 0.0) -> float:
+    # Of what it gains beside an accident.
     own = tried.fit.jacobian[:, -len(tried.hypothesis.free):]
-    return chance_of(tried.gain, tried.hypothesis, starts, evidence,
+    return chance_of(tried.gain - once, tried.hypothesis, starts, evidence,
                      dispersion(evidence, tried.fit.whitened, own))
 
 
