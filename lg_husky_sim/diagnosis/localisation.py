@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import probe_times
 from lg_husky_sim.diagnosis.evidence.whitener import respond
-from lg_husky_sim.diagnosis.hypotheses.bursts import burst_evidence
+from lg_husky_sim.diagnosis.hypotheses.bursts import burst_evidence, levelled
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, beyond_chance, hats
 from lg_husky_sim.diagnosis.result import Mismatch
 from lg_husky_sim.diagnosis.selection.screening import Projection
@@ -89,6 +89,13 @@ def steady_knots(drive: Drive, count: int) -> np.typing.NDArray[np.bool_]:
     return found
 
 
+def _speeds(drive: Drive, count: int) -> FloatArray:
+    # That are commanded at the knots; turning counts like rolling half a metre from the middle.
+    place = np.searchsorted(drive.logged.times, np.linspace(drive.start, drive.end, count), 'right')
+    held = drive.logged.values[np.maximum(place - 1, 0)]
+    return np.asarray(np.abs(held[:, 0]) + 0.5 * np.abs(held[:, 1]))
+
+
 def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
     """
     Return the missing effort of each balance over time.
@@ -111,6 +118,8 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
               for d in evidence.drives]
     steady = np.concatenate([steady_knots(d, n) for d, n in zip(
         evidence.drives, counts, strict=True)])
+    speeds = np.concatenate([_speeds(d, n) for d, n in zip(
+        evidence.drives, counts, strict=True)])[steady]
     for balance, (row, *_) in BALANCES.items():
         blocks, sizes = [], []
         for place, (drive, whitener) in enumerate(zip(
@@ -134,7 +143,8 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
         if BALANCES[balance][2] == 'none':
             # Those of the wheels burst with every command that comes a little late.
             normal, slope = projection.problem(columns[:, steady])
-            bursts = burst_evidence(slope / np.sqrt(np.maximum(np.diag(normal), 1e-12)))
+            bursts = burst_evidence(levelled(
+                slope / np.sqrt(np.maximum(np.diag(normal), 1e-12)), speeds))
             gain, explained = max(gain, bursts), max(explained, bursts)
         first = 0
         for size, drive in zip(sizes, evidence.drives, strict=True):

@@ -13,6 +13,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, eviden
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.hypotheses.bursts import burst_evidence, levelled
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import beyond_chance
 from lg_husky_sim.diagnosis.localisation import steady_knots
 from lg_husky_sim.diagnosis.selection.screening import Projection
@@ -88,3 +89,14 @@ def test_bursts_are_looked_for_where_the_drive_is_steady(fitted: tuple[Evidence,
     held = replace(drive, logged=replace(
         drive.logged, values=np.zeros_like(drive.logged.values)))
     assert np.array_equal(steady_knots(held, count), np.arange(count) > 1)
+
+
+def test_a_floor_that_is_rough_at_speed_is_no_burst_and_gusts_are_some() -> None:
+    rng = np.random.default_rng(8)
+    speeds = np.repeat([0.0, 0.3, 0.9], 50)
+    floor = rng.standard_normal(150) * np.repeat([0.1, 0.6, 2.0], 50)
+    gusts = rng.standard_normal(150) * np.where(rng.random(150) < 0.15, 8.0, 1.0)
+    assert burst_evidence(floor) > setting('unknown_alone')
+    assert burst_evidence(levelled(floor, speeds)) < 0.0
+    assert burst_evidence(levelled(gusts, speeds)) > setting('unknown_alone')
+    assert np.mean(levelled(floor, speeds) ** 2) == pytest.approx(1.0)

@@ -9,6 +9,9 @@ same noise all the time, of two where it bursts. The evidence is the ratio of th
 both, less what the two further numbers cost::
 
     log p(z; (1 - q) N(0, a^2) + q N(0, b^2)) - log p(z; N(0, s^2)) - log n
+
+A rough floor acts the more the faster the robot is, and not at rest: scores are compared with
+others at like speeds.
 """
 
 from __future__ import annotations
@@ -16,6 +19,29 @@ from __future__ import annotations
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+
+
+def levelled(scores: FloatArray, speeds: FloatArray) -> FloatArray:
+    """
+    Return scores over what is usual at their speeds.
+
+    Parameters
+    ----------
+    scores : numpy.ndarray, shape (n,)
+    speeds : numpy.ndarray, shape (n,)
+        Of the robot, in any unit.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        Of a mean square of one in each of some groups of like speed.
+    """
+    found = np.array(scores)
+    count = max(1, min(int(setting('burst_speeds')), scores.size // int(setting('burst_least'))))
+    for group in np.array_split(np.argsort(speeds, kind='stable'), count):
+        if group.size and np.any(scores[group]):
+            found[group] /= np.sqrt(np.mean(scores[group] ** 2))
+    return found
 
 
 def burst_evidence(scores: FloatArray) -> float:
