@@ -90,10 +90,11 @@ def steady_knots(drive: Drive, count: int) -> np.typing.NDArray[np.bool_]:
 
 
 def _speeds(drive: Drive, count: int) -> FloatArray:
-    # That are commanded at the knots; turning counts like rolling half a metre from the middle.
-    place = np.searchsorted(drive.logged.times, np.linspace(drive.start, drive.end, count), 'right')
-    held = drive.logged.values[np.maximum(place - 1, 0)]
-    return np.asarray(np.abs(held[:, 0]) + 0.5 * np.abs(held[:, 1]))
+    # That are commanded at the knots, of a point beside the middle.
+    knots = np.linspace(drive.start, drive.end, count)
+    place = np.searchsorted(drive.logged.times, knots, side='right')
+    forward, yaw = np.abs(drive.logged.values[np.maximum(place - 1, 0)]).T
+    return np.asarray(forward + setting('burst_lever') * yaw, dtype=np.float64)
 
 
 def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
