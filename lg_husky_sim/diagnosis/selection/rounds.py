@@ -203,13 +203,12 @@ def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     tried = [_best_form(evidence, base, t) for t in tried[:2]] + tried[2:]
-    once = {id(t.fit): accident(evidence, base.whitened, t.fit.whitened) for t in tried}
     tried.sort(key=lambda t: (is_negligible(t, evidence.noise.values),
-                              once[id(t.fit)] - t.score))
+                              _once(evidence, base, t) - t.score))
     tried = _from_the_start(evidence, base, tried)
     best = tried[0]
     chance = 1.0 if is_negligible(best, evidence.noise.values) else _chance(
-        evidence, best, starts, accident(evidence, base.whitened, best.fit.whitened))
+        evidence, best, starts, _once(evidence, base, best))
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
 
 
@@ -232,6 +231,10 @@ def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[T
     if again is None or again.score < best.score:
         return tried
     return [again, *(t for t in tried[1:] if t.hypothesis.effect != again.hypothesis.effect)]
+
+
+def _once(evidence: Evidence, base: Fit, tried: Tried) -> float:
+    return accident(evidence, base.whitened, tried.fit.whitened)
 
 
 def _chance(evidence: Evidence, tried: Tried, starts: int, once: float = 0.0) -> float:
