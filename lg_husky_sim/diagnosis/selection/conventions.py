@@ -63,10 +63,11 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     points = [_read_so(evidence, fit, one) for one in options]
     promised = evidence.pool.map(_promise_of(evidence, fit), points)
     order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
-    tried = [evidence.fit(points[place], fit.slopes, rounds=2) for place in order]
+    # All by as many steps: what the same reading gains by them is not due to another one.
+    rounds = int(setting('reading_rounds'))
+    tried = [evidence.fit(points[place], fit.slopes, rounds=rounds) for place in order]
     best = min(tried, key=lambda one: one.cost, default=fit)
-    # What the same reading gains by as many steps is not due to another one.
-    same = min(fit, evidence.fit(fit.point, rounds=3), key=lambda one: one.cost)
+    same = min(fit, evidence.fit(fit.point, rounds=rounds), key=lambda one: one.cost)
     if best.cost > same.cost - setting('reading_gain'):
         return fit if same.cost > fit.cost - setting('reading_gain') else same
     unknown = window_unknown(window, best.point.log.values.get(window, 0.0) or setting(

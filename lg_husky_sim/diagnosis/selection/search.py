@@ -68,7 +68,7 @@ def _as_logged(evidence: Evidence, base: Fit) -> tuple[Fit, list[Tried]]:
     if chosen is base:
         return base, []
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
-    seen = look(evidence, base, pool)[:int(setting('readings_fitted'))]
+    seen = look(evidence, base, pool)[:int(setting('early_effects'))]
     better = [t for t in fitted(evidence, base, seen, [base.point], whole=False)
               if t.gain > _promised(base, chosen)]
     return (base if better else chosen), better
@@ -117,8 +117,6 @@ class _Recalibrated:
 def _recalibrated(evidence: Evidence, start: Point) -> _Recalibrated:
     # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
     rough = evidence.fit(start, rounds=1)
-    evidence = evidence.renoised(rough)
-    rough = evidence.fit(start, rounds=2)
     chosen, early = _as_logged(evidence, rough)
     start = _nominal(chosen.point)
     return _Recalibrated(evidence, rough, early, *calibrated(evidence.about(start), start))
