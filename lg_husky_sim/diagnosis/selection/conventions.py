@@ -30,10 +30,6 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Where a mean over a window of sqrt(12) time constants has to be, against the stamp, to be as
-#: late and as long as a low pass.
-_LOW_PASS = 0.5 - 1.0 / math.sqrt(12.0)
-
 
 def best_reading(evidence: Evidence, fit: Fit) -> Fit:
     """
@@ -140,12 +136,18 @@ def _imu_options(evidence: Evidence, now: Reading) -> list[Reading]:
         return []
     period = round(_period(times), 4)
     return [replace(now, imu=place).replacing({'imu_window': window})
-            for place in (0.0, 0.5, 1.0, _LOW_PASS)
+            for place in (0.0, 0.5, 1.0, _low_pass())
             for window in (0.01, 0.04, period) if window <= _longest(place, period)]
+
+
+def _low_pass() -> float:
+    # Where a mean over sqrt(12) time constants has to be, against the stamp, to be as late and as
+    # long as a low pass.
+    return 0.5 - 1.0 / math.sqrt(12.0)
 
 
 def _longest(place: float | None, period: float) -> float:
     # A mean ends within its period or so; a low pass may last longer.
-    if place == _LOW_PASS:
+    if place == _low_pass():
         return math.sqrt(12.0) * setting('slowest_gyro')
     return max(setting('longest_imu_window'), period)
