@@ -23,7 +23,8 @@ from lg_husky_sim.cli.several import SeveralWords
                short_help='Find the physics that a model lacks; report and augmented model.')
 @click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]', type=RECORDING)
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='DIR',
-              help='Folder for diagnosis.json, model.yaml, report.html and the pictures.')
+              help='Folder for diagnosis.json, diagnosis.txt, model.yaml, plain.yaml, report.html '
+                   'and the pictures.')
 @click.option('--baseline', 'baselines', multiple=True, metavar='REC [REC …]', type=RECORDING,
               help='Recordings of the same robot before a change; then the question is what '
                    'changed. Give the recordings after it first, or behind --.')
@@ -35,7 +36,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.option('--jobs', type=click.IntRange(min=1), default=None, metavar='N',
               help='Threads to use; as many as there are cores by default.')
 @click.option('--report/--no-report', 'with_report', default=True, show_default=True,
-              help='Whether to write report.html and the pictures, a third of the time.')
+              help='Write report.html and the pictures, which takes a third of the time.')
 @spoken(page=True)
 def command(
     recordings: tuple[str, ...], out: Path, baselines: tuple[str, ...], robot: Path | None,

@@ -39,9 +39,9 @@ from lg_husky_sim.cli.several import SeveralWords
 @model_option('--model')
 @settings_option
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
-              help='Seed of all random numbers: starts, genes, noise.')
+              help='Seed of all random numbers: starting points, genes, noise.')
 @click.option('--starts', type=click.IntRange(min=1), default=6, show_default=True,
-              help='Starts of the least squares.')
+              help='Starting points of the least squares.')
 @click.option('--jobs', type=click.IntRange(min=1), default=1, show_default=True,
               help='Processes to use.')
 @topics_option

@@ -17,7 +17,7 @@ def command() -> None:
 @command.command(short_help="A run of NorLab's DRIVE data set.")
 @click.argument('path', type=click.Path(path_type=Path), metavar='PATH')
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='BAG',
-              help='Folder of the rosbag2 to write; it must not exist.')
+              help='Folder of the rosbag2 to write; it may exist only with --overwrite.')
 @click.option('--robot', default='husky', show_default=True, metavar='NAME',
               help='husky or warthog: for processed runs, whose commands are wheel rates.')
 @click.option('--storage', type=click.Choice(['mcap', 'sqlite3']), default='mcap',

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
               show_default=True, help='Open-loop fine-step robot, MuJoCo, four tyres with a '
                                       'speed loop, Bullet, or a mixture.')
 @click.option('--jobs', type=click.IntRange(1, 256), default=2, show_default=True,
-              help='Cases at the same time.')
+              help='Cases to run at the same time.')
 @click.option('--out', type=click.Path(path_type=Path), metavar='DIR',
               help='Folder of the trial; the same call resumes an interrupted one.')
 @click.option('--given', type=click.Path(path_type=Path, exists=True, file_okay=False),

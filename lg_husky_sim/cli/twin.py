@@ -42,7 +42,7 @@ def command(model: Path, plain: Path | None, preset: str | None, namespace: str 
     The running errors (root mean square, the last 10 s) are printed and published as
     std_msgs/Float64 on twin/plain/wheel_rate_error, twin/model/yaw_rate_error, …; for plots
     (layout config/twin.foxglove.json), twin/measured and twin/model/reading are published at each
-    stamp. The models start at the robot's wheel angles and heading, apply the delays, sensor
+    stamp. The models start at the robot's wheel angles and pose, apply the delays, sensor
     faults and onsets that were found, and follow the clock of its stamps. The robot may as well be
     `lg_husky play REC` or another simulator.
     """

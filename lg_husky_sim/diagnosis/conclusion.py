@@ -201,13 +201,13 @@ def unknown_finding(search: Search, rest: Sequence[Effort], free: Sequence[Missi
     smooth, bursts = rest[0], max(free, key=lambda one: one.evidence)
     is_smooth = smooth.evidence >= bursts.evidence
     balance = smooth.balance if is_smooth else bursts.balance
-    where = {'force': 'a force on the chassis', 'moment': 'a moment on the chassis',
+    where = {'force': 'a force on the chassis', 'moment': 'a yaw moment on the chassis',
              'torque_left': 'a torque on the left wheels',
              'torque_right': 'a torque on the right wheels'}[balance]
     parts = [smooth.values] if is_smooth else [m.values for m in free if m.balance == balance]
     largest = max(float(np.max(np.abs(one), initial=0.0)) for one in parts)
     _, _, side, subsystem, unit = BALANCES[balance]
-    regime = smooth.argument.replace('_', ' ') if is_smooth else 'scattered moments'
+    regime = smooth.argument.replace('_', ' ') if is_smooth else 'scattered times'
     how = f', a smooth function of {regime}' if is_smooth else f' at {regime}'
     text = (f'No effect of the catalogue explains it; it is best described as {where}{how}, '
             f'up to {largest:.3g} {unit}.')

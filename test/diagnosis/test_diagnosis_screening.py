@@ -84,7 +84,7 @@ def _least_squares(fit: Fit, columns: FloatArray) -> tuple[FloatArray, FloatArra
     return left.T @ left, left.T @ target
 
 
-def test_gusts_at_scattered_moments_are_unknown(
+def test_gusts_at_scattered_times_are_unknown(
         record: Callable[..., Recording], steps: Sequence[tuple[float, float, float]]) -> None:
     model = load_model()
     plant = compile_model(model.structure).at(model.parameters)
@@ -94,7 +94,7 @@ def test_gusts_at_scattered_moments_are_unknown(
     found = diagnose(recordings, model, lambda text, share: None).diagnosis
     assert found.verdict is Verdict.UNKNOWN
     assert found.findings[0].subsystem == 'rotation'
-    assert 'scattered moments' in found.findings[0].statement
+    assert 'scattered times' in found.findings[0].statement
 
 
 def gusty(recording: Recording, moments: Sequence[float]) -> Recording:
