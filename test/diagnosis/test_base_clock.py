@@ -97,6 +97,21 @@ def test_delays_of_single_steps_are_those_to_the_next_tick(made: Made) -> None:
     assert abs(np.mod(clock.phase - 0.011 + 0.5 * PERIOD, PERIOD) - 0.5 * PERIOD) < 0.1 * PERIOD
 
 
+def test_steps_that_no_rate_shows_tell_nothing(made: Made) -> None:
+    """A gyro alone sees nothing of a robot that drives straight ahead."""
+    recording = made('one', 0.0, 1)
+    straight = recording.streams['command']
+    values = straight.values * np.array([1.0 if name == 'forward' else 0.0
+                                         for name in straight.names])
+    alone = replace(recording, streams={
+        'command': replace(straight, values=values), 'imu': recording.streams['imu'],
+        'pose': recording.streams['pose']})
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    assert steps_of(plant, drives_of([alone])[0], Reading(), 0.02) is None
+    assert steps_of(plant, drives_of([recording])[0], Reading(), 0.02) is not None
+
+
 def test_a_clean_base_that_ticks_lacks_nothing(made: Made) -> None:
     said = diagnose([made('one', PERIOD, 1), made('two', PERIOD, 2)], load_model(),
                     lambda text, share: None).diagnosis

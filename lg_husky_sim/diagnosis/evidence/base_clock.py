@@ -167,7 +167,7 @@ def steps_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Steps |
     Returns
     -------
     Steps or None
-        None where no rate or no step of a command is known.
+        None where no rate or no step of a command is known, or none shows in a rate.
     """
     commands = drive.commands
     moved = np.flatnonzero(np.any(np.diff(commands.values, axis=0) != 0.0, axis=1)) + 1
@@ -200,6 +200,8 @@ def steps_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Steps |
             values.append(change[own])
     matrix = csc_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
                         shape=(residual.size, moved.size))
+    if not matrix.count_nonzero():
+        return None
     curvature = (matrix.T @ matrix).tocsc()
     slope = np.asarray(matrix.T @ residual).ravel()
     delays = spsolve(curvature + identity(moved.size, format='csc') / spread ** 2, slope)
