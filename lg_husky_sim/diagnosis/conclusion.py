@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.decision import confidence
+from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, Effort
 from lg_husky_sim.diagnosis.localisation import Missing, where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
-from lg_husky_sim.diagnosis.selection.rounds import Round, Tried
+from lg_husky_sim.diagnosis.selection.rounds import is_negligible, Round, Tried
 from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.settings import setting
@@ -145,6 +146,19 @@ def findings(search: Search) -> tuple[Finding, ...]:
     return tuple(sorted(found, key=lambda f: -f.held_out_gain))
 
 
+def needed_evidence(rest: Sequence[Effort], free: Sequence[Missing]) -> float:
+    """
+    Return the log evidence beyond which something without a name is missing [nats].
+
+    Parameters
+    ----------
+    rest : sequence of Effort
+    free : sequence of Missing
+        Each balance is looked at twice: for an effort that acts all the time and for bursts.
+    """
+    return evidence_beyond_chance(len(rest) + 2 * len({m.balance for m in free}))
+
+
 @dataclass(frozen=True)
 class Answer:
     """A verdict with its confidence, and the features that made it."""
@@ -171,21 +185,22 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     Answer
     """
     left = max([0.0, *(e.evidence for e in rest), *(m.evidence for m in free)])
+    is_left = left > needed_evidence(rest, free)
     explained = max([0.0, *(e.explained for e in rest), *(m.explained for m in free)])
     first = search.rounds[0]
     tried = first.tried
     if not search.adopted:
         gain = max(tried[0].gain, 0.0) if tried else 0.0
         features = confidence.Features(gain, 0.0, explained / max(gain, 1.0), first.chance)
-        if left > setting('unknown_alone'):
+        if is_left:
             return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
         return Answer(Verdict.NOTHING_MISSING, confidence.of_nothing(features), features)
     best = tried[0]
-    others = [t.gain for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id]
-    second = max([0.0, *others])
-    features = confidence.Features(best.gain, 1.0 - second / max(best.gain, 1e-9),
+    second = max((t.score for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id
+                  and not is_negligible(t, first.evidence.noise.values)), default=0.0)
+    features = confidence.Features(best.gain, 1.0 - max(second, 0.0) / max(best.score, 1e-9),
                                    explained / max(_explained(search), best.gain), first.chance)
-    if left > setting('unknown_evidence') and features.share > setting('unknown_share'):
+    if is_left and features.share > setting('unknown_share'):
         return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
     return Answer(Verdict.KNOWN, confidence.of_name(features), features)
 

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
+from lg_husky_sim.diagnosis.conclusion import needed_evidence
 from lg_husky_sim.diagnosis.diagnose import Case
 from lg_husky_sim.diagnosis.held_out import errors, split, stretches_of
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES
 from lg_husky_sim.diagnosis.localisation import Missing, missing_efforts, strengths
 from lg_husky_sim.diagnosis.planning import named_drive
 from lg_husky_sim.diagnosis.report import report_data
-from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.model_file import ModelFile
@@ -157,7 +157,7 @@ def _where(case: Case) -> tuple[Section, ...]:
         '; branches that the finding acts on are red' if elements else '') + (
         f', new ones dashed: {named}.' if added else '.')
     tables, charts = [], []
-    if any(e.evidence > setting('unknown_evidence') for e in efforts):
+    if any(e.evidence > needed_evidence(case.rest, efforts) for e in efforts):
         tables = [Table(('balance', 'relative evidence'), tuple(
             (name.replace('_', ' '), Cell(f'{100.0 * share:.0f} %', share))
             for name, share in strengths(efforts).items()))]

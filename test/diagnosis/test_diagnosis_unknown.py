@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -67,7 +68,7 @@ def test_an_effort_in_slow_innovations_counts_for_less(fitted: tuple[Evidence, F
         noise = rng.standard_normal(int(part[-1]) + 1)[part]
         other, projection = _with(fit, noise)
         chances[:, seed] = beyond_chance(evidence, other, projection, column)[:2]
-    most = setting('unknown_alone')
+    most = evidence_beyond_chance(30)
     assert np.count_nonzero(chances[1] > most) >= 5
     assert np.count_nonzero(chances[0] > most) == 0
 
@@ -96,7 +97,7 @@ def test_a_floor_that_is_rough_at_speed_is_no_burst_and_gusts_are_some() -> None
     speeds = np.repeat([0.0, 0.3, 0.9], 50)
     floor = rng.standard_normal(150) * np.repeat([0.1, 0.6, 2.0], 50)
     gusts = rng.standard_normal(150) * np.where(rng.random(150) < 0.15, 8.0, 1.0)
-    assert burst_evidence(floor) > setting('unknown_alone')
+    assert burst_evidence(floor) > evidence_beyond_chance(30)
     assert burst_evidence(levelled(floor, speeds)) < 0.0
-    assert burst_evidence(levelled(gusts, speeds)) > setting('unknown_alone')
+    assert burst_evidence(levelled(gusts, speeds)) > evidence_beyond_chance(30)
     assert np.mean(levelled(floor, speeds) ** 2) == pytest.approx(1.0)

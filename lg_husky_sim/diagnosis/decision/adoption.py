@@ -8,9 +8,15 @@ freedom on a robot that lacks nothing; with n hypotheses tried, the largest of t
 with a probability of at most n times that of one.
 
 Innovations that are not quite white make a gain larger by chance, by their dispersion.
+
+The log evidence of an effort without a name is the logarithm of a Bayes factor B. Where nothing is
+missing, its mean is one, so that ``P(B >= b) <= 1 / b`` (Markov), and with n of them that are
+looked at, the largest exceeds ``n / rate`` with a probability of at most that rate.
 """
 
 from __future__ import annotations
+
+import math
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
@@ -51,3 +57,20 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
 def is_beyond_chance(chance: float) -> bool:
     """Return whether a gain is beyond the stated false-alarm rate."""
     return chance < setting('false_alarm_rate')
+
+
+def evidence_beyond_chance(looks: int) -> float:
+    """
+    Return the log evidence that the best of some efforts without a name needs.
+
+    Parameters
+    ----------
+    looks : int
+        Number of them that were looked at.
+
+    Returns
+    -------
+    float
+        [nats]
+    """
+    return math.log(looks / setting('false_alarm_rate'))

@@ -4,9 +4,9 @@
 How sure an answer is, by logistic functions of what informs about it.
 
 Posterior odds carry no information: the form of no law is exact, so that they are near 1 for right
-and wrong names alike. What informs is the margin to the next name, ``1 - gain_2 / gain_1``, what a
-smooth effort still explains as a share of what the name explains, and how far a gain is beyond
-chance.
+and wrong names alike. What informs is the margin to the next name that is not negligible,
+``1 - score_2 / score_1`` (score: gain less what its numbers cost), what a smooth effort still
+explains as a share of what the name explains, and how far a gain is beyond chance.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ class Features:
     gain : float
         Of the first name [nats].
     margin : float
-        1 - gain of the next name / gain of the first, 0 to 1.
+        1 - score of the next name / score of the first, 0 to 1; less where the first is not the
+        one of the largest score.
     share : float
         Evidence of a smooth effort beside the name over the gain of the name.
     chance : float

@@ -86,21 +86,32 @@ def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]
     return evidence, evidence.fit(with_jitter(chosen.point, evidence))
 
 
-def _seeds(evidence: Evidence, rough: Fit, base: Fit, early: Sequence[Tried]) -> list[Tried]:
+def _seeds(first: Evidence, base: Fit, early: Sequence[Tried]) -> list[Tried]:
     # Where the numbers of the robot, and the noise, have taken an effect's place, what the effect
-    # gains with numbers and noise of its own.
+    # that promises most at the nominal numbers gains with numbers and noise of its own.
+    if 0.5 * float(np.sum(base.point.strain ** 2)) < setting('distorted'):
+        return []
+    nominal = _nominal(base.point)
+    evidence = first.about(nominal)
+    rough = evidence.fit(nominal, rounds=1)
+    pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
+    begins = {one.hypothesis.label: (one.hypothesis, [(rough.point, one.numbers)])
+              for one in look(evidence, rough, pool)[:int(setting('early_effects'))]}
     names = [u.name for u in rough.point.unknowns]
-    if (not early or 0.5 * float(np.sum(base.point.strain ** 2)) < setting('distorted')
-            or names != [u.name for u in base.point.unknowns]):
+    for one in early[:1]:
+        if [u.name for u in one.fit.point.unknowns[:len(names)]] == names:
+            there = rough.point.at(one.fit.point.places[:len(names)])
+            begins.setdefault(one.hypothesis.label, (one.hypothesis, []))[1].append(
+                (there, numbers_of(one)))
+    fits = [attempt(evidence, rough, hypothesis, [
+        *starts, *((starts[-1][0], own) for own in hypothesis.starts)], whole=False)
+        for hypothesis, starts in begins.values()]
+    tried = [one for one in fits if one is not None]
+    if not tried:
         return []
-    one = early[0].hypothesis
-    there = replace(rough.point, places=early[0].fit.point.places[:len(names)])
-    best = attempt(evidence, rough, one, [(there, start) for start in (
-        numbers_of(early[0]), *one.starts)], whole=False)
-    if best is None:
-        return []
+    best = max(tried, key=lambda one: one.score)
     own, fit = calibrated(evidence, best.fit.point, 1)
-    return [Tried(one, fit, own.fit(base.point).cost - fit.cost, own.count)]
+    return [Tried(best.hypothesis, fit, own.fit(base.point).cost - fit.cost, own.count)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +119,6 @@ class _Recalibrated:
     """The model as it is, with the noise and the reading of the log."""
 
     first: Evidence
-    rough: Fit
     early: Sequence[Tried]
     evidence: Evidence
     base: Fit
@@ -119,7 +129,7 @@ def _recalibrated(evidence: Evidence, start: Point) -> _Recalibrated:
     rough = evidence.fit(start, rounds=1)
     chosen, early = _as_logged(evidence, rough)
     start = _nominal(chosen.point)
-    return _Recalibrated(evidence, rough, early, *calibrated(evidence.about(start), start))
+    return _Recalibrated(evidence, early, *calibrated(evidence.about(start), start))
 
 
 def _at_ticks(known: _Recalibrated, start: Point, progress: Progress) -> _Recalibrated | None:
@@ -170,7 +180,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     if ticked is not None:
         known = ticked
     evidence, base = known.evidence, known.base
-    seeds = _seeds(known.first, known.rough, base, known.early)
+    seeds = _seeds(known.first, base, known.early)
     chosen, better = _as_logged(evidence, base)
     if seeds and seeds[0].gain > _promised(base, chosen):
         chosen, better = base, seeds
