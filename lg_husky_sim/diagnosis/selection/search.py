@@ -86,9 +86,25 @@ def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]
     return evidence, evidence.fit(with_jitter(chosen.point, evidence))
 
 
-def _seeds(first: Evidence, base: Fit, early: Sequence[Tried]) -> list[Tried]:
-    # Where the numbers of the robot, and the noise, have taken an effect's place, what the effect
-    # that promises most at the nominal numbers gains with numbers and noise of its own.
+def seeds_of(first: Evidence, base: Fit, early: Sequence[Tried]) -> list[Tried]:
+    """
+    Return what to begin with where recalibrated numbers have taken the place of an effect.
+
+    Parameters
+    ----------
+    first : Evidence
+        Under a first guess of the noise.
+    base : Fit
+        Recalibrated.
+    early : sequence of Tried
+        Effects that promised more than another reading of the sensors.
+
+    Returns
+    -------
+    list of Tried
+        The effect that is best at the nominal numbers, with numbers and noise of its own; none
+        where the prior penalty of the recalibration is small.
+    """
     if 0.5 * float(np.sum(base.point.strain ** 2)) < setting('distorted'):
         return []
     nominal = _nominal(base.point)
@@ -180,7 +196,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     if ticked is not None:
         known = ticked
     evidence, base = known.evidence, known.base
-    seeds = _seeds(known.first, base, known.early)
+    seeds = seeds_of(known.first, base, known.early)
     chosen, better = _as_logged(evidence, base)
     if seeds and seeds[0].gain > _promised(base, chosen):
         chosen, better = base, seeds
