@@ -50,28 +50,31 @@ def _asymmetry(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     return replace(network, graph=network.graph.with_branches(bearing))
 
 
-def _on_axles(describe: Callable[[str, float, str], tuple[LawRow, tuple[str, ...]]]) -> Edit:
-    # A law on the axles of a side, from the number of its motor, its place and the axle's rate.
+def _on_axles(describe: Callable[[str, str, float, str], tuple[LawRow, tuple[str, ...]]]) -> Edit:
+    # A law on the axles of a side, from its shape, the number of its motor, its place and the
+    # axle's rate.
     def apply(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         motors = {letter: (number, side) for number, letter, side, _ in MOTORS}
         for letter, inertia in axles(network.graph, effect.side):
             number, side = motors[letter]
-            row, of = describe(number, side, f'omega({inertia.name})')
+            row, of = describe(effect.shape, number, side, f'omega({inertia.name})')
             network = network.with_effort_on(f'T_{effect.id}_{letter}', inertia, row, *of)
         return network
     return Edit(apply)
 
 
-def _dry(number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
+def _dry(shape: str, number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
     row = LawRow(Law.COULOMB, ('dry_torque', 'dry_speed', 'breakaway_share', 'breakaway_speed'))
     return row, (rate,)
 
 
-def _ripple(number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
-    return LawRow(Law.WHEEL_PHASE, ('ripple_cos', 'ripple_sin', side, 'ripple_speed')), (rate,)
+def _ripple(shape: str, number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
+    twice = (0.0, 0.0) if shape == 'once' else ('ripple_cos_twice', 'ripple_sin_twice')
+    return LawRow(Law.WHEEL_PHASE, (
+        'ripple_cos', 'ripple_sin', side, 'ripple_speed', *twice)), (rate,)
 
 
-def _play(number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
+def _play(shape: str, number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
     row = LawRow(Law.BACKLASH, ('play', 'torque_constant*gear_ratio', side))
     return row, (f'V(V_S{number})', rate, f'i(L_{number})')
 
