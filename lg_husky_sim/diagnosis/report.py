@@ -261,6 +261,11 @@ def unnamed(diagnosis: Diagnosis) -> tuple[str, ...]:
                  if not any(one.statement.startswith(text) for one in diagnosis.findings))
 
 
+def unbroken(text: str) -> str:
+    """Return a number in words that no line breaks apart."""
+    return text.replace(' ', '\N{NO-BREAK SPACE}').replace('-', '\N{NON-BREAKING HYPHEN}')
+
+
 def found_numbers(diagnosis: Diagnosis) -> tuple[Section, ...]:
     """Return the numbers of the findings with their intervals and evidence."""
     rows, points = [], []
@@ -275,7 +280,7 @@ def found_numbers(diagnosis: Diagnosis) -> tuple[Section, ...]:
         points.append(f'{capitalised(effect_words(finding))} ({finding.subsystem}): shows '
                       f'{finding.regime or "everywhere"}; acts {onset_words(finding.onset)}. '
                       f'{place}Gain {number(finding.held_out_gain)} nats'
-                      f'{"; " + finding.chance if finding.chance else ""}.')
+                      f'{"; " + unbroken(finding.chance) if finding.chance else ""}.')
     tables = (Table(('effect', 'parameter', 'estimate', '95 % interval', 'unit'), tuple(rows)),)
     return (Section('The finding in numbers', points=tuple(points),
                     tables=tables if rows else ()),) if points else ()
