@@ -112,15 +112,16 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
 
 def _facts(finding: Finding, several: bool, changed: bool) -> tuple[tuple[str, str], ...]:
     # The phase of a ripple says where on the wheel, not how large.
-    words = '; '.join(size_words(one) for one in sized(finding.parameters)
-                      if one.name != PHASE) or '–'
+    sizes = [size_words(one) for one in sized(finding.parameters) if one.name != PHASE]
+    words = '; '.join(sizes) or '–'
     if several:
         return ((f'Size of {effect_words(finding)}', words),)
     kind = catalogue().get(finding.effect)
     sided = kind is not None and set(kind.sides) & {'left', 'right', 'both'}
     return (('Effect', finding.effect.replace('_', ' ')),
             ('Side', finding.side if sided and finding.side != 'none' else 'whole robot'),
-            ('Size', words),
+            # More than two numbers are read better in the sentence than in a small box.
+            *((('Size', words),) if len(sizes) <= 2 else ()),
             ('Acts', 'in the later recordings' if changed else onset_words(finding.onset)))
 
 

@@ -77,33 +77,6 @@ def _fit(request: Request, parts: Sequence[Segment], jobs: int, scheduler: str |
                     baseline=request.before, progress=tell)
 
 
-def fit_together(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
-                 scheduler: str | None = None, tell: Callable[[str], None] | None = None
-                 ) -> tuple[FitResult, tuple[Path, ...]]:
-    """
-    Fit one model to all recordings and write it with its report.
-
-    Parameters
-    ----------
-    request : Request
-    paths : sequence of str
-    out : pathlib.Path
-        Model file.
-    jobs : int
-    scheduler : str, optional
-    tell : callable, optional
-
-    Returns
-    -------
-    FitResult
-    tuple of pathlib.Path
-        The files.
-    """
-    parts = read_segments(request, paths)
-    result = _fit(request, parts, jobs, scheduler, tell)
-    return result, write_fit(result, parts, request.before, out, _made_of(paths))
-
-
 def _made_of(paths: Sequence[str]) -> Provenance:
     return provenance([(Path(path).name, path) for path in paths])
 
