@@ -29,6 +29,8 @@ EXTRAS = {
     # Not part of `all`: where PyPI has no wheel, it is built by a C++ compiler.
     'bullet': ['pybullet>=3.2.5'],
     'scale': ['dask[distributed]>=2024.1'],
+    # Not part of `all` either: large, and one cluster is enough.
+    'ray': ['ray>=2.9'],
     'search': ['deap>=1.4'],
     'report': ['jinja2>=3.1', 'plotly>=6.0'],
     'tables': ['control>=0.10', 'pandas>=2.0'],
@@ -95,6 +97,7 @@ setup(
     ],
     install_requires=[
         'click>=8.1',
+        'joblib>=1.3',
         'numpy>=1.26',
         'pyyaml>=6.0',
         'rich>=13',

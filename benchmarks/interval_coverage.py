@@ -18,8 +18,8 @@ from lg_husky_sim.evaluation.engine import engine_config
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.identification.estimate import estimate
-from lg_husky_sim.identification.executor import run_tasks
 from lg_husky_sim.manoeuvres import find_manoeuvre
+from lg_husky_sim.parallel import run_tasks
 from lg_husky_sim.recording import Recording, segments
 from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.simulation import rollout

@@ -43,3 +43,7 @@ class SettingsError(LgHuskyError):
 
 class MissingExtraError(LgHuskyError):
     """An optional dependency that is needed here and not installed."""
+
+
+class BackendError(LgHuskyError):
+    """Workers for parallel tasks that cannot be reached, or were lost."""

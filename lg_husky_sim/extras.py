@@ -21,6 +21,7 @@ EXTRA_OF = {
     'pandas': 'tables',
     'plotly': 'report',
     'pybullet': 'bullet',
+    'ray': 'ray',
     'rosbags': 'bags',
     'threadpoolctl': 'fast',
 }

@@ -102,6 +102,18 @@ def test_a_recording_saved_and_read_is_the_same(drive: Path, tmp_path: Path) -> 
         recording.save(tmp_path / 'copy')
 
 
+def test_a_trajectory_for_evo_holds_the_measured_pose(drive: Path, tmp_path: Path) -> None:
+    recording = lg.read(drive)
+    rows = np.loadtxt(recording.save_tum(tmp_path / 'drive.tum'))
+    pose = recording.pose
+    assert rows.shape == (len(pose.times), 8)
+    assert np.diff(rows[:, 0]) == pytest.approx(np.diff(pose.times), abs=1e-6)
+    assert rows[:, 1:3] == pytest.approx(pose.values[:, :2], abs=1e-6)
+    assert 2.0 * np.arctan2(rows[:, 6], rows[:, 7]) == pytest.approx(
+        np.arctan2(np.sin(pose.values[:, 2]), np.cos(pose.values[:, 2])), abs=1e-6)
+    assert not np.any(rows[:, [3, 4, 5]])
+
+
 def test_a_folder_of_bags_stands_for_all_of_them(drive: Path, tmp_path: Path) -> None:
     for name in ('b', 'a'):
         lg.read(drive).save(tmp_path / name)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
+import re
 import subprocess
 import sys
 from typing import Any
@@ -108,6 +109,16 @@ def test_a_page_is_opened_only_when_asked_for(
     assert opened == []
     run(*arguments, '--open')
     assert opened == [str(tmp_path / 'out' / 'index.html')]
+
+
+def test_the_page_says_which_verbs_have_no_result_to_print() -> None:
+    page = (Path(__file__).parents[1] / 'docs' / 'command_line.md').read_text(encoding='utf-8')
+    said = page.split('`demo`, `drive`', 1)[1].split('print no JSON')[0]
+    context = click.Context(main.cli)
+    without = {name for name in main.cli.list_commands(context)
+               if 'as_json' not in {option.name for option in main.cli.get_command(
+                   context, name).params}}  # type: ignore[union-attr]
+    assert {'demo', 'drive', *re.findall('`([a-z-]+)`', said)} == without
 
 
 def test_quiet_and_verbose_exclude_each_other() -> None:

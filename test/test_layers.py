@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'lg_husky_sim'
 MAX_LINES = 400
 
-BASE = {'blas', 'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'processes', 'resources',
+BASE = {'blas', 'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'parallel', 'resources',
         'signals', 'yaml_files'}
 MODEL = {'linear_graph', 'husky', 'simulation'}
 DATA = MODEL | {'recording', 'comparison', 'reporting'}
@@ -27,7 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'yaml_files': {'errors'},
     'blas': set(),
     'jit': {'errors', 'extras'},
-    'processes': set(),
+    'parallel': {'errors', 'extras'},
     'manoeuvres': {'errors', 'signals', 'resources', 'yaml_files'},
     'linear_graph': set(),
     'husky': {'linear_graph'},
@@ -57,7 +57,7 @@ rosbags, and proof writes bags with code of its own, as the blind trial shares n
 
 ONLY_INSIDE_FUNCTIONS = {'sympy', 'matplotlib', 'mujoco', 'pybullet', 'dask', 'distributed',
                          'rosbags', 'cyclonedds', 'jinja2', 'pandas', 'control', 'plotly',
-                         'PIL', 'threadpoolctl'}
+                         'PIL', 'threadpoolctl', 'joblib', 'ray'}
 """Slow to import or optional: the package imports without them. The
 backends of ros are chosen at run time, each in files of its own that import what they need."""
 

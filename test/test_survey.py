@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import lg_husky_sim as lg
-from lg_husky_sim.api.surveys import hardly_driven, limits
+from lg_husky_sim.api.surveys import limits
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
@@ -89,11 +89,6 @@ def test_the_share_of_each_regime_adds_up_to_the_motion() -> None:
     assert rows['reversing'] == pytest.approx(10.0, abs=0.1)
     assert rows['at rest'] == pytest.approx(10.0, abs=0.1)
     assert rows['turning while driving'] == 0.0
-
-
-def test_regimes_that_were_hardly_driven_are_named(drive: lg.Recording) -> None:
-    assert 'reversing' in hardly_driven(drive.info().excitation)
-    assert 'turning while driving' not in hardly_driven(drive.info().excitation)
 
 
 def test_what_a_straight_drive_cannot_determine_is_said_before_any_fit() -> None:

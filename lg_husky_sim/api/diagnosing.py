@@ -187,7 +187,6 @@ def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),
              jobs: int | None = None, topics: Topics = None,
              progress: Shown = True) -> DiagnosisResult:
     """Say which physics a model lacks; see :meth:`lg_husky_sim.Husky.diagnose`."""
-    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # each process has its own core
     from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case
     from lg_husky_sim.diagnosis.diagnose import diagnose as run
 
@@ -195,6 +194,7 @@ def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),
     with shown(progress) as report:
         after = read_all(recordings, topics=topics, progress=lambda stage, _: report(stage, 0.0))
         before = read_all(baseline, topics=topics, progress=lambda stage, _: report(stage, 0.0))
-        case = change_case(after, before, husky.model, report, jobs=jobs or 1) if before else run(
-            after, husky.model, report, jobs=jobs or 1)
+        jobs = jobs or os.cpu_count() or 1
+        case = change_case(after, before, husky.model, report, jobs=jobs) if before else run(
+            after, husky.model, report, jobs=jobs)
     return DiagnosisResult(case, tuple(after), husky, tuple(before))

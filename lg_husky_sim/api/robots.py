@@ -213,7 +213,7 @@ class Husky(Graph):
         baseline : path-like, Recording, or several of them
             Of the same robot before a change; then the question is what changed.
         jobs : int, optional
-            Processes; 1 by default in Python, where a script may not be importable.
+            Threads; as many as there are cores by default.
         topics : mapping of str to str, optional
             Topics of the recordings chosen by hand.
         progress : bool or callable

@@ -219,12 +219,6 @@ def _missing(recording: Recording, parts: Sequence[rec.Segment], moving: float,
     return tuple(said)
 
 
-def hardly_driven(excitation: Table) -> tuple[str, ...]:
-    """Return the regimes that were hardly driven, by a table of excitation."""
-    return tuple(str(name) for name, _, share in excitation.rows
-                 if isinstance(share, float) and share < limits()['least_share'])
-
-
 def _related(related: Sequence[Relation]) -> Table:
     """Return what each stream says of the others, without a model of the robot."""
     return Table('Sensors against each other (factor: reference over source)', (

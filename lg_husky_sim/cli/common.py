@@ -231,7 +231,6 @@ NUISANCES = Words(_nuisances, ',')
 SETTING = Words(_parameters, ending='=')
 TOPIC = Words(_roles, ending='=')
 COMMANDS = Words(_manoeuvres, files=True)
-MANOEUVRE = Words(_manoeuvres)
 MODEL = click.Path(path_type=Path)
 
 

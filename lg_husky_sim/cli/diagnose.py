@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import click
@@ -64,7 +63,7 @@ def command(
     husky = Husky(robot, **parse_settings(settings))
     with say.stages() as report:
         found = husky.diagnose(
-            recordings, baseline=baselines, jobs=jobs or os.cpu_count() or 1,
+            recordings, baseline=baselines, jobs=jobs,
             topics=TopicMap.parse(topics), progress=report)
         try:
             report('report and pictures' if with_report else 'files', 0.95)

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from lg_husky_sim.cli.common import Output, spoken
 
 if TYPE_CHECKING:
     from lg_husky_sim.diagnosis.planning import Rival
@@ -30,19 +32,19 @@ if TYPE_CHECKING:
               type=click.FloatRange(0.1, 3.0), help='Highest speed of a drive.')
 @click.option('--max-yaw', default=0.8, show_default=True, metavar='RAD/S',
               type=click.FloatRange(0.1, 3.0), help='Highest yaw rate of a drive.')
+@spoken()
 def command(folder: Path | None, effects: str | None, robot: Path | None, out: Path,
-            max_speed: float, max_yaw: float) -> None:
+            max_speed: float, max_yaw: float, say: Output) -> None:
     """
     Write the drive that best tells the first two explanations of a diagnosis apart.
 
     DIR is the folder of a diagnosis. Each explanation is simulated on a list of drives and
     the other one refitted to it; the drive on which neither can imitate the other wins.
     """
-    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    from lg_husky_sim.api.tables import Table
     from lg_husky_sim.diagnosis.planning import drives, plan
     from lg_husky_sim.diagnosis.settings import setting
     from lg_husky_sim.errors import SettingsError
-    from tqdm import tqdm
 
     if (folder is None) == (effects is None):
         raise SettingsError('give either the folder of a diagnosis or --effects A,B')
@@ -50,20 +52,22 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
         raise SettingsError(f'cannot write {out}: it must be a file in an existing folder')
     one, two = _from_folder(folder) if folder is not None else _from_ids(effects or '', robot)
     candidates = drives(max_speed, max_yaw)
-    with tqdm(total=len(candidates), desc='drives', disable=None, leave=False) as bar:
-        ranked = plan(one, two, candidates, bar.update)
-    click.echo(f'{one.name} against {two.name}: expected evidence from one recording of each '
-               'drive, whichever of the two is true')
-    click.echo(f'{"drive":18} {"length":>7} {"evidence":>10}  best channel')
-    for row in ranked:
-        click.echo(f'{row.manoeuvre.name:18} {row.manoeuvre.duration:5.0f} s '
-                   f'{row.nats:8.1f} nats  {row.channel}')
+    with say.stages() as report:
+        done = itertools.count(1)
+        ranked = plan(one, two, candidates,
+                      lambda: report('drives', next(done) / len(candidates)))
     best = ranked[0]
     _write(out, best.manoeuvre, f'{best.manoeuvre.about}; tells {one.name} and {two.name} apart '
                                 f'by {best.nats:.0f} nats')
-    click.echo(f'{out}: {best.manoeuvre.name}, {best.manoeuvre.about}')
+    title = (f'{one.name} against {two.name}: expected evidence from one recording of each '
+             'drive, whichever of the two is true')
+    say.result(Table(title, ('drive', 'length [s]', 'evidence [nats]', 'best channel'), tuple(
+        (row.manoeuvre.name, row.manoeuvre.duration, row.nats, row.channel) for row in ranked)),
+        [{'drive': row.manoeuvre.name, 'length_s': row.manoeuvre.duration,
+          'evidence_nats': row.nats, 'channel': row.channel} for row in ranked])
+    say.written(out, f': {best.manoeuvre.name}, {best.manoeuvre.about}')
     if best.nats < setting('decisive'):
-        click.echo('None of these drives is decisive: another sensor is needed, or more speed.')
+        say.remark('None of these drives is decisive: another sensor is needed, or more speed.')
 
 
 def _from_ids(text: str, robot: Path | None) -> tuple[Rival, Rival]:

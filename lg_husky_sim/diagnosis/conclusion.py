@@ -20,6 +20,7 @@ from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import sentence
 from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.network import on_side
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -138,9 +139,10 @@ def findings(search: Search) -> tuple[Finding, ...]:
                             search.final.point.numbers)
         onset = search.final.point.structure.onset if effect.late else None
         regime = where_it_shows(one.evidence, _gains(one.base, best.fit))
+        side = _acting_side(effect, numbers)
         found.append(Finding(
-            effect.id, _acting_side(effect, numbers), effect.kind.subsystem.value,
-            effect.kind.elements, regime, onset, numbers, best.gain, one.chance,
+            effect.id, side, effect.kind.subsystem.value,
+            on_side(effect.kind.elements, side), regime, onset, numbers, best.gain, one.chance,
             min(1.0, best.gain / total), rivals_of(one),
             sentence(effect, onset, numbers, regime)))
     return tuple(sorted(found, key=lambda f: -f.held_out_gain))

@@ -112,15 +112,16 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
 
 def _facts(finding: Finding, several: bool, changed: bool) -> tuple[tuple[str, str], ...]:
     # The phase of a ripple says where on the wheel, not how large.
-    words = '; '.join(size_words(one) for one in sized(finding.parameters)
-                      if one.name != PHASE) or '–'
+    sizes = [size_words(one) for one in sized(finding.parameters) if one.name != PHASE]
+    words = '; '.join(sizes) or '–'
     if several:
         return ((f'Size of {effect_words(finding)}', words),)
     kind = catalogue().get(finding.effect)
     sided = kind is not None and set(kind.sides) & {'left', 'right', 'both'}
     return (('Effect', finding.effect.replace('_', ' ')),
             ('Side', finding.side if sided and finding.side != 'none' else 'whole robot'),
-            ('Size', words),
+            # More than two numbers are read better in the sentence than in a small box.
+            *((('Size', words),) if len(sizes) <= 2 else ()),
             ('Acts', 'in the later recordings' if changed else onset_words(finding.onset)))
 
 
@@ -261,6 +262,11 @@ def unnamed(diagnosis: Diagnosis) -> tuple[str, ...]:
                  if not any(one.statement.startswith(text) for one in diagnosis.findings))
 
 
+def unbroken(text: str) -> str:
+    """Return a number in words that no line breaks apart."""
+    return text.replace(' ', '\N{NO-BREAK SPACE}').replace('-', '\N{NON-BREAKING HYPHEN}')
+
+
 def found_numbers(diagnosis: Diagnosis) -> tuple[Section, ...]:
     """Return the numbers of the findings with their intervals and evidence."""
     rows, points = [], []
@@ -275,7 +281,7 @@ def found_numbers(diagnosis: Diagnosis) -> tuple[Section, ...]:
         points.append(f'{capitalised(effect_words(finding))} ({finding.subsystem}): shows '
                       f'{finding.regime or "everywhere"}; acts {onset_words(finding.onset)}. '
                       f'{place}Gain {number(finding.held_out_gain)} nats'
-                      f'{"; " + finding.chance if finding.chance else ""}.')
+                      f'{"; " + unbroken(finding.chance) if finding.chance else ""}.')
     tables = (Table(('effect', 'parameter', 'estimate', '95 % interval', 'unit'), tuple(rows)),)
     return (Section('The finding in numbers', points=tuple(points),
                     tables=tables if rows else ()),) if points else ()

@@ -43,9 +43,6 @@ if TYPE_CHECKING:
 
 #: Factor of a law that is switched off: no Stribeck share.
 _ABSENT = re.compile(r'\(1\+\(0\.0\)\*exp\([^*]*\*\*2\)\)\*')
-#: Branches of the right side's drivetrain, and those of the left one's.
-_OF_SIDE = {'right': re.compile(r'(_[FR]R|RW|MR|BeltR|_S2|\b[RL]_2|TF_[5-8])$'),
-            'left': re.compile(r'(_[FR]L|LW|ML|BeltL|_S1|\b[RL]_1|TF_[1-4])$')}
 #: Term of a law whose factor is zero.
 _ZERO = re.compile(r'[+-]?\(?0\.0\)?\*(sin|cos)\([^()]*\)|\+0\*\(0\.0\)')
 
@@ -148,8 +145,7 @@ def _where(case: Case) -> tuple[Section, ...]:
     diagnosis = case.diagnosis
     efforts = missing_efforts(case.search.evidence, case.search.plain)
     plain, final = diagnosis.plain_model.structure, diagnosis.model.structure
-    elements = [e for f in diagnosis.findings for e in f.elements
-                if f.side not in _OF_SIDE or _OF_SIDE[f.side].search(e)]
+    elements = [e for f in diagnosis.findings for e in f.elements]
     added = new_elements(plain, final)[1]
     short = _short_names(*new_elements(plain, final))[1]
     named = ', '.join(f'{a} is {b}' for a, b in zip(short, added, strict=True))

@@ -167,7 +167,7 @@ def figures(result: CaseResult) -> tuple[tuple[Chart, ...], tuple[Drawing, ...]]
     first = result.drives[0]
     drawings = [Drawing(
         f'{case}_fig13',
-        f'Fig. 13, {case}: wheel rates, forward speed and yaw rate on the {first.name}',
+        f'Fig. 13, {case}: wheel rates, forward speed and yaw rate, {first.name}',
         partial(responses_picture, data, recording_name(result, first.name)))]
     for number, drive in enumerate(result.drives, FIRST_TRAJECTORY):
         drawings.append(Drawing(

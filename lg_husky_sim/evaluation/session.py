@@ -134,7 +134,7 @@ def report_data(request: Request, results: Sequence[CaseResult], steps: Sequence
     """
     columns = tuple(dict.fromkeys(label for result in results for label in result.labels))
     said = [line for result in results for line in case_report.verdict(result)[:1]]
-    closest = [f'{result.case.name}: {name}' for result in results
+    closest = [name if len(results) == 1 else f'{result.case.name}: {name}' for result in results
                if (name := case_report.closest(result))]
     facts = (('Cases', ', '.join(result.case.name for result in results) or 'none'),
              ('Recordings of steps', str(len(steps))), ('Seed', str(request.seed)))

@@ -11,6 +11,9 @@ forward motion and ``yaw`` the turning of the base.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+import re
+
 from lg_husky_sim.linear_graph import Branch, Domain, Kind, LinearGraph, TwoPort
 
 #: Reference nodes.
@@ -118,3 +121,27 @@ def expanded() -> LinearGraph:
             rest.append(slip)
             ports.extend(pair)
     return LinearGraph((*inertias, *_chassis(), *rest), tuple(ports), GROUNDS)
+
+
+#: Ends of the names of what only one side has; an added element ends in _L or _R.
+_OF_SIDE = {'left': re.compile(r'(_[FR]?L|LW|ML|BeltL|_S1|\b[RL]_1|TF_[1-4])$'),
+            'right': re.compile(r'(_[FR]?R|RW|MR|BeltR|_S2|\b[RL]_2|TF_[5-8])$')}
+
+
+def on_side(elements: Iterable[str], side: str) -> tuple[str, ...]:
+    """
+    Return the elements that an effect of a side can act on.
+
+    Parameters
+    ----------
+    elements : iterable of str
+    side : str
+        ``left`` or ``right``; any other leaves all elements.
+
+    Returns
+    -------
+    tuple of str
+        Those of the side, and those of both.
+    """
+    other = _OF_SIDE.get({'left': 'right', 'right': 'left'}.get(side, ''))
+    return tuple(name for name in elements if other is None or not other.search(name))

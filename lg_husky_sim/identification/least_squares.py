@@ -11,7 +11,7 @@ import math
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import EffectParameter
 from lg_husky_sim.husky.model import HuskyModel
-from lg_husky_sim.husky.parameters import Parameter, Parameters
+from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.layout import Layout
 from lg_husky_sim.identification.noise import Metric
@@ -63,13 +63,6 @@ class Unknown:
         """Return the number for a varied quantity, inside the bounds."""
         raw = math.exp(min(varied, 700.0)) if self.logarithmic else varied
         return min(max(raw, self.lower), self.upper)
-
-
-def nominal_unknown(parameter: Parameter, deviation: float | None = None) -> Unknown:
-    """Return a robot's parameter as an unknown with its tolerance as relative prior."""
-    spread = parameter.tolerance if deviation is None else deviation
-    return Unknown(parameter.name, True, math.log(parameter.value),
-                   spread if spread > 0.0 else math.inf, parameter.lower, parameter.upper, 0.01)
 
 
 def effect_unknown(parameter: EffectParameter, start: float) -> Unknown:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
-from lg_husky_sim.identification.executor import run_tasks
 from lg_husky_sim.identification.least_squares import Problem, Solution, solve, Unknown
 from lg_husky_sim.identification.noise import Metric, metric, scales
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.identification.unknowns import starts_of
+from lg_husky_sim.parallel import run_tasks
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 

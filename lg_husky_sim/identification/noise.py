@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 from lg_husky_sim.identification.problem import Observations
@@ -132,11 +131,6 @@ class Metric:
         if observations.common is None:
             return white
         return self.shared(observations).without(white)
-
-    @cached_property
-    def uncorrelated(self) -> Metric:
-        """The same scale without the correlation, in time and between channels."""
-        return Metric(self.scale, {name: np.ones(1) for name in self.filters})
 
     def shared(self, observations: Observations) -> Shared:
         """

@@ -10,7 +10,7 @@ physics that depends on heading, place or a wheel's angle acts where the robot r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
@@ -210,14 +210,6 @@ class Observations:
         onset = plant.onset
         return plant if onset is None else plant.in_recording(
             recording, onset.before(self.recordings))
-
-    def read_as(self, momentary: bool) -> Observations:
-        """Return the observations with wheel rates of the moment, or as means over a while."""
-        return replace(self, pieces=tuple(replace(p, momentary=momentary) for p in self.pieces))
-
-    def subset(self, keep: Sequence[bool]) -> Observations:
-        """Return the observations of some of the pieces."""
-        return Observations(tuple(p for p, k in zip(self.pieces, keep, strict=True) if k))
 
 
 def _observe(piece: Piece, plant: Plant, grid: FloatArray, extra: Mapping[str, float]

@@ -19,7 +19,6 @@ from functools import lru_cache
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 #: Channels whose residual is taken off others, in this order: source, then weight in it.
@@ -116,13 +115,6 @@ def apart(observations: Observations, parts: Mapping[str, Mapping[str, float]],
         if part:
             left = left - part * (link.operator @ values)
     return left
-
-
-def rows_of_recordings(observations: Observations) -> tuple[NDArray[np.int64], ...]:
-    """Return the rows of the measurement vector of each recording, in their order."""
-    return tuple(np.concatenate([
-        np.arange(s.first, s.last) for s in observations.slices
-        if observations.pieces[s.piece].recording == name]) for name in observations.recordings)
 
 
 def averaging(times: FloatArray, begins: FloatArray, ends: FloatArray

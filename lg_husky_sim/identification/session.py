@@ -11,9 +11,9 @@ from pathlib import Path
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.estimate import estimate, STARTS
-from lg_husky_sim.identification.executor import run_tasks
 from lg_husky_sim.identification.report import write_fit
 from lg_husky_sim.identification.result import FitResult, Method
+from lg_husky_sim.parallel import run_tasks
 from lg_husky_sim.recording import (
     named_apart,
     named_as_in,
@@ -77,33 +77,6 @@ def _fit(request: Request, parts: Sequence[Segment], jobs: int, scheduler: str |
                     baseline=request.before, progress=tell)
 
 
-def fit_together(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
-                 scheduler: str | None = None, tell: Callable[[str], None] | None = None
-                 ) -> tuple[FitResult, tuple[Path, ...]]:
-    """
-    Fit one model to all recordings and write it with its report.
-
-    Parameters
-    ----------
-    request : Request
-    paths : sequence of str
-    out : pathlib.Path
-        Model file.
-    jobs : int
-    scheduler : str, optional
-    tell : callable, optional
-
-    Returns
-    -------
-    FitResult
-    tuple of pathlib.Path
-        The files.
-    """
-    parts = read_segments(request, paths)
-    result = _fit(request, parts, jobs, scheduler, tell)
-    return result, write_fit(result, parts, request.before, out, _made_of(paths))
-
-
 def _made_of(paths: Sequence[str]) -> Provenance:
     return provenance([(Path(path).name, path) for path in paths])
 
@@ -153,7 +126,9 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
     if len(set(names)) != len(names):
         raise SettingsError('two recordings have one name; --each writes a file for each')
     word = tell or (lambda text: None)
-    results = run_tasks(_fit_one, [_Task(request, path) for path in paths], jobs, scheduler,
+    # A worker of a cluster may work in another folder.
+    tasks = [_Task(request, str(Path(path).absolute())) for path in paths]
+    results = run_tasks(_fit_one, tasks, jobs, scheduler,
                         lambda: word('recording'))
     for name, path, result in zip(names, paths, results, strict=True):
         write_fit(result, read_segments(request, [path]), request.before, out / f'{name}.yaml',

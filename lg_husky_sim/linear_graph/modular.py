@@ -93,11 +93,6 @@ class Elimination:
         """Start with all rows unused."""
         self._rows: IntArray = np.mod(np.asarray(matrix, dtype=np.int64), PRIME)
 
-    @property
-    def rows_left(self) -> int:
-        """Number of equations not yet used."""
-        return int(self._rows.shape[0])
-
     def pivot(self, column: int) -> bool:
         """
         Use an unused equation to express the column by the others.

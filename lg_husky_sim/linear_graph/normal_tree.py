@@ -115,7 +115,7 @@ def _one_ports_in_tree(graph: LinearGraph) -> set[str]:
     return chosen
 
 
-def _interconnection(graph: LinearGraph, leave_out: frozenset[str] = frozenset()) -> Elimination:
+def _interconnection(graph: LinearGraph) -> Elimination:
     """Return Kirchhoff's laws and two-ports over (across, through), ports eliminated."""
     count = len(graph.edges)
     incidence = graph.incidence()

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import as_completed, Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 import json
 from pathlib import Path
 import shutil
@@ -17,7 +17,7 @@ import time
 from typing import Any
 
 from lg_husky_sim.errors import CommandError, LgHuskyError, RecordingError
-from lg_husky_sim.processes import processes
+from lg_husky_sim.parallel import map_tasks
 from lg_husky_sim.proof import bags, measures, outcomes, plain
 from lg_husky_sim.proof.cases import generate, NoTraceError, Spec
 from lg_husky_sim.proof.sealing import unseal, write_json
@@ -45,6 +45,10 @@ class Folders:
 
     root: Path
     cases_of: Path | None = None
+
+    def absolute(self) -> Folders:
+        """Return the same folders for a process that may work in another one."""
+        return Folders(self.root.absolute(), self.cases_of and self.cases_of.absolute())
 
     @property
     def cases(self) -> Path:
@@ -101,7 +105,8 @@ def keep_plan(folders: Folders, specs: Sequence[Spec]) -> None:
     write_json(path, plan)
 
 
-def _generate(spec: Spec, name: str, folders: Folders, held_out: bool) -> tuple[str, str]:
+def _generate(case: tuple[Spec, str], folders: Folders, held_out: bool) -> tuple[str, str]:
+    spec, name = case
     for again in range(TRIES):
         try:
             return name, generate(
@@ -143,16 +148,9 @@ def prepare(folders: Folders, specs: Sequence[Spec], jobs: int, done: Progress,
 
 def _made(folders: Folders, missing: Sequence[tuple[Spec, str]], jobs: int,
           held_out: bool) -> Iterator[tuple[str, str]]:
-    """Generate cases, in this process with one job; yield names and commitments."""
-    if jobs == 1 or len(missing) == 1:
-        for spec, name in missing:
-            yield _generate(spec, name, folders, held_out)
-        return
-    with processes(jobs) as pool:
-        waiting = [pool.submit(_generate, spec, name, folders, held_out)
-                   for spec, name in missing]
-        for future in as_completed(waiting):
-            yield future.result()
+    """Generate cases; yield names and commitments."""
+    make = partial(_generate, folders=folders.absolute(), held_out=held_out)
+    yield from map_tasks(make, missing, jobs)
 
 
 def command_for(folders: Folders, name: str, out: Path, told: Mapping[str, Any]) -> list[str]:
@@ -276,17 +274,9 @@ def _measured(folders: Folders, name: str, model: Path) -> tuple[list[Any], str]
 
 
 def diagnose_all(folders: Folders, names: Sequence[str], jobs: int) -> Iterator[dict[str, Any]]:
-    """Diagnose cases on `jobs` cores at once; yield outcomes as they come."""
-    pool = ThreadPoolExecutor(jobs)
-    waiting: list[Future[dict[str, Any]]] = []
-    try:
-        waiting = [pool.submit(diagnose, folders, name) for name in names]
-        for future in as_completed(waiting):
-            yield future.result()
-    finally:
-        for future in waiting:
-            future.cancel()
-        pool.shutdown(wait=True, cancel_futures=True)
+    """Diagnose cases on `jobs` cores at once, or on a cluster; yield outcomes in order."""
+    # Threads here: each waits for a process of its own, which hears Ctrl-C.
+    yield from map_tasks(partial(diagnose, folders.absolute()), names, jobs, threads=True)
 
 
 def diagnosed(folders: Folders, names: Sequence[str]) -> list[str]:

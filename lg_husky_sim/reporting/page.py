@@ -103,9 +103,9 @@ def _change_cell(known: Mapping[str, float], compared: tuple[str, str], low: flo
     before, after = (known.get(name, math.nan) for name in compared)
     words = change(before, after)
     if math.isfinite(low) and math.isfinite(high):
-        # Kept on one line, however narrow the screen.
+        # On a narrow screen in two lines: the table must not hide its last column.
         ends = f'({change(1.0, low)} to {change(1.0, high)})'
-        words += ' ' + ends.replace('\u00a0% to ', ' to ').replace(' ', '\u00a0')
+        words += ' ' + ends.replace('\u00a0% to ', '\u00a0to ')
     # A change that is rounded away, or whose interval includes none, is neither.
     if not (math.isfinite(before) and math.isfinite(after)) or low < 1.0 < high or (
             abs(after - before) < 0.005 * before):

@@ -47,6 +47,15 @@
   const axis = (more) => ({ gridcolor: colour('--plot-grid'), zeroline: false,
     linecolor: colour('--line'), ticks: 'outside', tickcolor: colour('--line'),
     nticks: narrow() ? 5 : 8, ...more });
+  // Ticks of a logarithmic axis as whole numbers: 200, 500, 1000, not 2, 5, 1000.
+  const decades = (values) => {
+    const seen = values.filter((one) => one > 0), ticks = [];
+    const [least, most] = [Math.min(...seen), Math.max(...seen)].map(Math.log10);
+    for (let power = Math.floor(least); power <= Math.ceil(most); power += 1) {
+      for (const digit of most - least < 3 ? [1, 2, 5] : [1]) ticks.push(digit * 10 ** power);
+    }
+    return { tickvals: ticks, ticktext: ticks.map((one) => String(Number(one.toPrecision(1)))) };
+  };
   const config = { responsive: true, displaylogo: false, displayModeBar: coarse || narrow() ? false : 'hover',
     modeBarButtonsToRemove: ['lasso2d', 'select2d', 'autoScale2d'] };
 
@@ -124,7 +133,8 @@
     const x = find(state.recording, 'x'), y = find(state.recording, 'y');
     place.style.display = x && y ? '' : 'none';
     if (!x || !y) return;
-    const layout = base(narrow() ? 430 : 560), lines = [];
+    // On a phone each name of the legend may need a line of its own.
+    const layout = base(narrow() ? 430 + 18 * data.columns.length : 560), lines = [];
     layout.xaxis = axis({ title: { text: 'x [m]' } });
     layout.yaxis = axis({ title: { text: 'y [m]' }, scaleanchor: 'x', scaleratio: 1 });
     layout.hovermode = 'closest';
@@ -146,9 +156,9 @@
       marker: { size: 5, color: error || colour('--measured'), cmin: 0, cmax: most,
         colorscale: [[0, dark.matches ? '#4a90c2' : '#9cc4e4'], [0.5, '#e69f00'],
           [1, dark.matches ? '#ff5a4d' : '#b3001b']],
-        showscale: Boolean(error), colorbar: { title: { text: 'error [m]', side: 'top' },
-          orientation: 'h', thickness: 10, y: -62 / (layout.height - 132), yanchor: 'top',
-          len: 0.7 } } });
+        showscale: Boolean(error), colorbar: { ticksuffix: ' m',
+          orientation: 'h', thickness: 10, yref: 'container', y: 62 / layout.height,
+          yanchor: 'top', len: 0.7 } } });
     const first = x.m.findIndex(Number.isFinite);
     lines.push({ x: [x.m[first]], y: [y.m[first]], type: 'scatter', mode: 'markers', name: 'start',
       marker: { symbol: 'triangle-right', size: 12, color: colour('--ink') }, hoverinfo: 'skip' });
@@ -167,7 +177,8 @@
       const one = charts[place.dataset.chart], layout = base(narrow() ? 300 : 340), lines = [];
       if (!one || !place.offsetParent) continue;
       layout.xaxis = axis({ title: { text: plain(one.x) } });
-      layout.yaxis = axis({ title: { text: plain(one.y) }, type: one.log ? 'log' : 'linear' });
+      layout.yaxis = axis({ title: { text: plain(one.y) }, automargin: true, type: one.log ? 'log' : 'linear',
+        ...(one.log ? decades(one.lines.flatMap((own) => Array.from(floats(own.y)))) : {}) });
       one.lines.forEach((own, index) => {
         const shade = data.palette[index % data.palette.length][dark.matches ? 1 : 0];
         const x = floats(own.x), y = floats(own.y), s = floats(own.s);

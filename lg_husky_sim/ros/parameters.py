@@ -5,16 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.ros.api import message_type, Node, Parameter, parameter_overrides
 from lg_husky_sim.ros.settings import (
     BY_NAME,
-    DEFAULT_PRESET,
     make_settings,
-    preset_values,
     Setting,
     Settings,
     TABLE,
@@ -81,11 +79,6 @@ def declare_settings(node: Node) -> Settings:
     return settings
 
 
-def parameter_defaults(preset: str = DEFAULT_PRESET) -> dict[str, object]:
-    """Return all defaults under a preset, as parameter values."""
-    return {name: _plain(value) for name, value in preset_values(preset).items()}
-
-
 class LiveSettings:
     """
     Keeps settings and parameters in step while the node runs.
@@ -136,8 +129,3 @@ class LiveSettings:
         self._apply(settings)
         self._settings = settings
         return settings
-
-
-def as_values(settings: Settings) -> dict[str, object]:
-    """Return settings as parameter values."""
-    return {name: _plain(value) for name, value in asdict(settings).items()}

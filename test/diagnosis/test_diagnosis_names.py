@@ -58,6 +58,7 @@ def test_hidden_effect_is_named_with_its_side_and_size(
         (effect.id, effect.kind.subsystem.value)]
     if effect.side in ('left', 'right'):
         assert found.findings[0].side == effect.side
+        assert found.findings[0].elements == {'left': ('J_LW',), 'right': ('J_RW',)}[effect.side]
     for one in found.findings[0].parameters:
         if one.name in sizes:
             assert one.value == pytest.approx(sizes[one.name], rel=0.25)

@@ -99,6 +99,14 @@ def test_advice_has_the_numbers_and_the_stream() -> None:
     assert 'model:=model.yaml' in simulator.sentences[-1]
 
 
+def test_many_numbers_stand_in_the_sentence_and_not_in_a_box() -> None:
+    numbers = [Estimate(name, 1.0, 'm', 0.9, 1.1) for name in ('com_x', 'com_y', 'com_height')]
+    for count in (1, 2, 3):
+        facts = dict(headline(_diagnosis(
+            Verdict.KNOWN, _finding('payload', 'none', *numbers[:count]))).facts)
+        assert ('Size' in facts) == (count < 3)
+
+
 @pytest.mark.parametrize(('name', 'shapes'), [
     ('stamp_delay', {('sensor_time_offset', 'none'): 'imu'}), ('imu_late', {})])
 def test_stamps_that_are_early_are_called_early(name: str, shapes: dict[tuple[str, str], str]

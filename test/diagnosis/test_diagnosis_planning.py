@@ -61,7 +61,15 @@ def test_command_writes_a_script_that_can_be_driven(tmp_path: Path, capsys: Any)
     script = load_manoeuvre(out)
     assert np.max(np.abs(script.commands().column('forward'))) <= 0.5
     assert 'yaw_scrub_coulomb' in script.about
-    assert 'nats' in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert '[nats]' in said
+    assert f'{script.about.split(";")[0]}' in said
+    assert run(['plan-drive', '--effects', 'yaw_scrub_coulomb,command_latency', '--out', str(out),
+                '--max-speed', '0.5', '--json']) == 0
+    rows = json.loads(capsys.readouterr().out)
+    evidence = [row['evidence_nats'] for row in rows]
+    assert len(rows) > 3
+    assert evidence == sorted(evidence, reverse=True)
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [

@@ -6,13 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import json
-import math
 from pathlib import Path
 
 from lg_husky_sim.cli.main import run
-from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.model_file import load_model
-from lg_husky_sim.identification.executor import run_tasks
 from lg_husky_sim.recording import Segment, write_recording
 import pytest
 
@@ -79,9 +76,9 @@ def test_bad_input_is_one_line_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_dask_gives_the_same_results(bag: Path, tmp_path: Path) -> None:
+def test_two_workers_of_dask_give_the_same_results(bag: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip('distributed')
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False,
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False,
                                   dashboard_address=None) as cluster:
         address = ['--scheduler', cluster.scheduler_address]
         there, here = tmp_path / 'there.yaml', tmp_path / 'here.yaml'
@@ -94,33 +91,11 @@ def test_dask_gives_the_same_results(bag: Path, tmp_path: Path) -> None:
     assert dict(load_model(tmp_path / 'each' / f'{bag.name}.yaml').parameters) == local
 
 
-@pytest.mark.parametrize('backend', ['dask', 'dask:', 'spark:x', 'threads'])
-def test_a_backend_that_is_none_is_one_line(
-        backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv('LG_HUSKY_BACKEND', backend)
-    with pytest.raises(FitError, match=f"LG_HUSKY_BACKEND = '{backend}' is not allowed"):
-        run_tasks(math.factorial, [1, 2])
-
-
-def test_processes_are_the_backend_of_who_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv('LG_HUSKY_BACKEND', 'processes')
-    assert run_tasks(math.factorial, [3, 4], jobs=2) == [6, 24]
-
-
 def test_a_scheduler_that_does_not_answer_is_one_line(
         bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
         capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('distributed')
-    monkeypatch.setattr('lg_husky_sim.identification.executor.PATIENCE', 0.2)
+    monkeypatch.setattr('lg_husky_sim.parallel.PATIENCE', 0.2)
     assert run(['identify', str(bag), '--out', str(tmp_path / 'x.yaml'), '--scheduler',
                 'tcp://127.0.0.1:9']) == 1
     assert "no Dask scheduler answers at 'tcp://127.0.0.1:9'" in capsys.readouterr().err
-
-
-def test_tasks_keep_their_order_and_their_errors() -> None:
-    done: list[int] = []
-    assert run_tasks(math.factorial, [4, 1, 3], jobs=2, progress=lambda: done.append(1)) == [
-        24, 1, 6]
-    assert len(done) == 3
-    with pytest.raises(ValueError, match='negative'):
-        run_tasks(math.factorial, [1, -3, 2], jobs=2)

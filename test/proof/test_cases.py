@@ -22,7 +22,7 @@ import pytest
 
 PROOF = Path(__file__).resolve().parents[2] / 'lg_husky_sim' / 'proof'
 ALLOWED = {'numpy', 'scipy', 'mujoco', 'numba', 'rosbags', 'yaml', 'matplotlib',
-           'pybullet', 'lg_husky_sim.errors', 'lg_husky_sim.processes', 'lg_husky_sim.resources',
+           'pybullet', 'lg_husky_sim.errors', 'lg_husky_sim.parallel', 'lg_husky_sim.resources',
            'lg_husky_sim.yaml_files'}
 
 

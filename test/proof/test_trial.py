@@ -56,6 +56,24 @@ def play(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     return asked
 
 
+def test_a_cluster_makes_the_same_cases(
+        prepared: trial.Folders, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Two workers that stand in another folder; every recording is the same to the last bit."""
+    distributed = pytest.importorskip('distributed')
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None
+                                  ) as cluster:
+        monkeypatch.setenv('LG_HUSKY_BACKEND', f'dask:{cluster.scheduler_address}')
+        monkeypatch.chdir(tmp_path)
+        there = trial.Folders(Path('there'))
+        sealed = trial.prepare(there, SPECS, 1, lambda name: None)
+    assert list(sealed) == ['case_0001', 'case_0002']
+    files = sorted(path.relative_to(prepared.cases) for path in prepared.cases.rglob('*')
+                   if path.is_file())
+    assert len(files) > 3
+    for path in files:
+        assert (there.cases / path).read_bytes() == (prepared.cases / path).read_bytes(), path
+
+
 def test_a_trial_is_sealed_blind_resumed_and_scored(
         prepared: trial.Folders, monkeypatch: pytest.MonkeyPatch) -> None:
     sealed = json.loads(prepared.commitments.read_text())

@@ -158,7 +158,7 @@ def test_a_loss_is_as_visible_as_a_gain() -> None:
     ), COLUMNS, compared=(RECALIBRATED, WITH_FINDING))
     assert _changes(table) == [
         ('+100\u00a0% worse', Tone.BAD), ('−50\u00a0%', Tone.GOOD), ('+0\u00a0%', Tone.PLAIN),
-        ('+5\u00a0% (−10\u00a0to\u00a0+20\u00a0%)', Tone.PLAIN), ('+0\u00a0%', Tone.PLAIN)]
+        ('+5\u00a0% (−10\u00a0to +20\u00a0%)', Tone.PLAIN), ('+0\u00a0%', Tone.PLAIN)]
 
 
 def test_models_side_by_side_have_their_best_marked() -> None:

@@ -18,6 +18,7 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.result import Estimate, Finding
 from lg_husky_sim.diagnosis.sensors.faults import Fault
 from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.husky.network import on_side
 from scipy.stats import norm
 
 #: What the statement of such a fault ends in.
@@ -99,7 +100,8 @@ def fault_findings(found: Sequence[Fault], fit: Fit | None = None) -> tuple[Find
             numbers = estimates(fit, [fault.number.name], fit.point.numbers)
         kind = fault.effect.kind
         made.append(Finding(
-            fault.effect.id, fault.effect.side, kind.subsystem.value, kind.elements,
-            'everywhere', None, numbers, gain, 2.0 * float(norm.sf(fault.certainty)),
+            fault.effect.id, fault.effect.side, kind.subsystem.value,
+            on_side(kind.elements, fault.effect.side), 'everywhere', None, numbers, gain,
+            2.0 * float(norm.sf(fault.certainty)),
             min(1.0, gain / total), (), f'{fault.statement}. {UNMODELLED}'))
     return tuple(made)
