@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+import math
 
 from lg_husky_sim.diagnosis.decision import confidence
 from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
@@ -159,6 +160,31 @@ def needed_evidence(rest: Sequence[Effort], free: Sequence[Missing]) -> float:
         Each balance is looked at twice: for an effort that acts all the time and for bursts.
     """
     return evidence_beyond_chance(len(rest) + 2 * len({m.balance for m in free}))
+
+
+def remaining(search: Search) -> Search:
+    """
+    Return a search under the noise that is fair to what it leaves.
+
+    Parameters
+    ----------
+    search : Search
+
+    Returns
+    -------
+    Search
+        With disturbances that may last as long as a robot stays at a place, where those of the
+        search last as long as they may: what a floor does for seconds is no unknown effort.
+    """
+    longest = setting('longest_time')
+    times = [value for name, value in search.evidence.noise.values.items()
+             if name.endswith('_time')]
+    if not math.isclose(max(times), longest):
+        return search
+    evidence = search.evidence.renoised(search.final, longest='longest_memory')
+    final = evidence.fit(search.final.point, search.final.slopes,
+                         rounds=int(setting('whole_rounds')))
+    return replace(search, evidence=evidence, final=final)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from lg_husky_sim.diagnosis.conclusion import (
     estimates,
     findings,
     indistinguishable,
+    remaining,
     unknown_finding,
 )
 from lg_husky_sim.diagnosis.decision.confidence import Features
@@ -114,10 +115,11 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         found = unsearched(evidence, start) if different else search(evidence, start, progress)
         different = different or impossible(found.final, nominal.parameters)
         progress('smooth efforts', 0.85)
-        rest = efforts(found.evidence, found.final)
-        free = missing_efforts(found.evidence, found.final)
+        left = remaining(found)
+        rest = efforts(left.evidence, left.final)
+        free = missing_efforts(left.evidence, left.final)
         progress('numbers', 0.9)
-        said, features = _diagnosis(found, rest, free, parts, nominal, there)
+        said, features = _diagnosis(found, left, rest, free, parts, nominal, there)
         if different:
             progress('another robot: what differs', 0.92)
             sized = ModelFile(start.structure, start.numbers)
@@ -141,10 +143,10 @@ def _of_other_robot(said: Diagnosis, other: Misfit) -> Diagnosis:
         held_out_augmented=other.held_out or said.held_out_plain, fits=False)
 
 
-def _diagnosis(found: Search, rest: Sequence[Effort], free: Sequence[Missing],
+def _diagnosis(found: Search, left: Search, rest: Sequence[Effort], free: Sequence[Missing],
                parts: Sequence[Segment], nominal: ModelFile, there: Sequence[Fault]
                ) -> tuple[Diagnosis, Features]:
-    said = answer(found, rest, free)
+    said = answer(left, rest, free)
     sensors = fault_findings(there, found.final)
     if sensors and said.verdict is Verdict.NOTHING_MISSING:
         said = replace(said, verdict=Verdict.KNOWN)

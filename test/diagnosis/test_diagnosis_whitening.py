@@ -113,7 +113,7 @@ def test_intensities_are_recovered_within_a_quarter(setup: tuple[Evidence, Point
                  for column in simulated(whitener, TRUE, 4, 2).T]
     start = Noise({name: 1.8 * value for name, value in TRUE.values.items()})
     found = fit_noise(start, [whitener.frame] * 4, [whitener.model] * 4, residuals,
-                      evidence.pool, 12).values
+                      evidence.pool, 12, setting('longest_time')).values
     for name in ('force', 'moment', 'drive', 'wheel', 'gyro', 'place', 'heading'):
         assert found[name] == pytest.approx(TRUE.values[name], rel=0.25), name
 

@@ -349,31 +349,6 @@ def test_encoders_run_ahead_of_the_wheels_within_the_play(robot: Maker) -> None:
     assert max(both[1].column('wheel_left')[:10]) < 0.96 * unloaded
 
 
-def test_ripple_comes_once_a_turn(robot: Maker) -> None:
-    """One period of the wheel's speed for one turn of the wheel, on its side only."""
-    run = driven(robot(Effect('torque_ripple', 'left'), ripple_cos=3.0, ripple_sin=0.0),
-                 STRAIGHT, each=8.0)
-    base = driven(robot(), STRAIGHT, each=8.0)
-    late = slice(200, None)
-    angle = run.column('angle_left')[late]
-
-    def amplitude(channel: str, turns: int) -> float:
-        extra = (run.column(channel) - base.column(channel))[late]
-        return float(abs(np.mean((extra - extra.mean()) * np.exp(1j * turns * angle))))
-    assert amplitude('wheel_left', 1) > 5.0 * amplitude('wheel_left', 2)
-    assert amplitude('wheel_left', 1) > 2.0 * amplitude('wheel_right', 1)
-
-
-def test_a_ripple_has_a_second_harmonic_where_it_is_told_one(robot: Maker) -> None:
-    steady = slice(200, None)
-    base = driven(robot(), STRAIGHT, each=8.0).column('wheel_left')[steady]
-    run = driven(robot(Effect('torque_ripple', 'left', 'twice'), ripple_cos=0.0, ripple_sin=0.0,
-                       ripple_cos_twice=3.0, ripple_sin_twice=0.0), STRAIGHT, each=8.0)
-    angle, extra = run.column('angle_left')[steady], run.column('wheel_left')[steady] - base
-    once, twice = (abs(np.mean((extra - extra.mean()) * np.exp(1j * k * angle))) for k in (1, 2))
-    assert twice > 5.0 * once
-
-
 def test_sensors_read_what_they_are_told(robot: Maker) -> None:
     truth = driven(robot(), STRAIGHT, TURN)
     honest = robot().observe(truth)

@@ -318,7 +318,7 @@ class Evidence:
             fresh = before - cost > setting('trusted_slopes') * hoped
         return Fit(point, cost, whitened, rows, tuple(raw), predicted)
 
-    def renoised(self, fit: Fit, rounds: int = 6) -> Evidence:
+    def renoised(self, fit: Fit, rounds: int = 6, longest: str = 'longest_time') -> Evidence:
         """
         Return this evidence with intensities that are likeliest for a fit's residuals.
 
@@ -327,6 +327,8 @@ class Evidence:
         fit : Fit
         rounds : int
             Largest number of steps.
+        longest : str
+            Setting: the longest time constant of a disturbance.
 
         Returns
         -------
@@ -343,7 +345,8 @@ class Evidence:
                   for d, plant, p in zip(drives, plants, predicted, strict=True)]
         models = self.deviations(fit.point)
         residuals = [d.measured - p for d, p in zip(drives, predicted, strict=True)]
-        noise = fit_noise(self.noise, frames, models, residuals, self.pool, rounds)
+        noise = fit_noise(self.noise, frames, models, residuals, self.pool, rounds,
+                          setting(longest))
         whiteners = [whitener_of(f, m, noise) for f, m in zip(frames, models, strict=True)]
         return Evidence(drives, self.names, noise, whiteners, self.pool)
 

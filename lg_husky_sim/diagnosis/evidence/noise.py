@@ -200,7 +200,7 @@ def first_guess(drives: Sequence[Drive]) -> Noise:
     return Noise(values)
 
 
-def _bounds() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _bounds(longest: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     centre = np.array([math.log(setting(f'first_{n}')) if n not in (
         'wheel', 'gyro', 'place', 'heading') else 0.0 for n in NAMES])
     spread = np.array([setting('time_spread') if n.endswith('_time') else setting('noise_spread')
@@ -208,13 +208,14 @@ def _bounds() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
                        for n in NAMES])
     lower = np.array([math.log(setting('least_time')) if n.endswith('_time') else -16.0
                       for n in NAMES])
-    upper = np.array([math.log(setting('longest_time')) if n.endswith('_time') else 6.0
+    upper = np.array([math.log(longest) if n.endswith('_time') else 6.0
                       for n in NAMES])
     return centre, spread, lower, upper
 
 
 def fit_noise(start: Noise, frames: Sequence[Frame], models: Sequence[FloatArray],
-              residuals: Sequence[FloatArray], pool: Executor, rounds: int) -> Noise:
+              residuals: Sequence[FloatArray], pool: Executor, rounds: int, longest: float
+              ) -> Noise:
     """
     Find the intensities of all noise by maximum likelihood (Fisher scoring).
 
@@ -227,12 +228,14 @@ def fit_noise(start: Noise, frames: Sequence[Frame], models: Sequence[FloatArray
         Threads for the independent filters.
     rounds : int
         Largest number of scoring steps.
+    longest : float
+        Longest time constant of a disturbance [s].
 
     Returns
     -------
     Noise
     """
-    centre, spread, lower, upper = _bounds()
+    centre, spread, lower, upper = _bounds(longest)
     step = 0.05
 
     def run(place: FloatArray) -> tuple[float, FloatArray, FloatArray]:
