@@ -12,9 +12,7 @@ from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import catalogue, descriptions, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
-from lg_husky_sim.husky.network import expanded, on_side, simplified
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.linear_graph import Branch, LinearGraph, TwoPort
 from lg_husky_sim.signals import FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation import rollout
 import numpy as np
@@ -64,19 +62,6 @@ def last(plant: Plant, command: tuple[float, float], channel: str) -> float:
 
 
 WANDER = ((0.6, 0.0), (0.6, 0.4), (0.0, -0.5), (-0.5, 0.2), (0.01, 0.0), (0.0, 0.0))
-
-
-@pytest.mark.parametrize('graph', [simplified(), expanded()], ids=['simplified', 'expanded'])
-def test_elements_of_a_side_are_those_that_hang_on_its_nodes(graph: LinearGraph) -> None:
-    elements: list[Branch | TwoPort] = [*graph.branches, *graph.two_ports]
-    for element in elements:
-        nodes = (*element.port1[1:], *element.port2[1:]) if isinstance(element, TwoPort) else (
-            element.tail, element.head)
-        assert not any(node.endswith('L') for node in nodes) or not any(
-            node.endswith('R') for node in nodes), 'one that joins both sides'
-        assert bool(on_side([element.name], 'left')) != any(n.endswith('R') for n in nodes)
-        assert bool(on_side([element.name], 'right')) != any(n.endswith('L') for n in nodes)
-    assert on_side(['J_LW', 'J_RW', 'imu'], 'both') == ('J_LW', 'J_RW', 'imu')
 
 
 def test_ids_and_subsystems() -> None:
