@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from lg_husky_sim.ros.api import Node, steady_timer
+from lg_husky_sim.ros.api import message_type, Node, steady_timer
 from lg_husky_sim.ros.graph import publishers
 from lg_husky_sim.ros.settings import Settings
 
@@ -26,7 +26,9 @@ def topics_out(settings: Settings) -> tuple[str, ...]:
 
 
 def shared(settings: Settings) -> tuple[str, ...]:
-    """Return the topics that a node of these settings shares with others."""
+    """Return the topics that a node of these settings shares with others, if it can at all."""
+    if message_type('tf2_msgs/msg/TFMessage') is None:
+        return ()
     static = settings.scan != 'none' and settings.publish_scan_tf
     moving = settings.publish_tf or settings.publish_map_tf
     return (*(['tf'] if moving else []), *(['tf_static'] if static else []))

@@ -9,7 +9,8 @@ import itertools
 import time
 from typing import Any
 
-from lg_husky_sim.ros import api, diagnostics, outputs
+from lg_husky_sim.ros import api, diagnostics, neighbours, outputs
+from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.ros.simulation_node import SimNode
 from lg_husky_sim.signals import BodyTwist
 from lg_husky_sim.testing.live import Probe
@@ -231,3 +232,11 @@ def test_a_parameter_can_change_by_the_api_and_is_checked(
     assert 'cannot be used' in outcome('model', '/no/file.yaml')
     assert node.settings.model == ''
     assert node.engine.settings.command_timeout == 1.5
+
+
+def test_what_cannot_be_published_is_not_announced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without tf2_msgs, which is not in common_interfaces, the start-up log lists no tf."""
+    settings = make_settings({'scan': 'free', 'publish_scan_tf': True})
+    assert neighbours.shared(settings) == ('tf', 'tf_static')
+    monkeypatch.setattr(neighbours, 'message_type', lambda name: None)
+    assert neighbours.shared(settings) == ()
