@@ -20,7 +20,7 @@ from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import sentence
-from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.effects import descriptions, Effect
 from lg_husky_sim.husky.network import on_side
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.signals import FloatArray
@@ -187,6 +187,32 @@ def remaining(search: Search) -> Search:
     return replace(search, evidence=evidence, final=final)
 
 
+def felt(rest: Sequence[Effort], free: Sequence[Missing]
+         ) -> tuple[tuple[Effort, ...], tuple[Missing, ...]]:
+    """
+    Return the efforts that are not negligible.
+
+    Parameters
+    ----------
+    rest : sequence of Effort
+    free : sequence of Missing
+        Of all drives.
+
+    Returns
+    -------
+    tuple of Effort
+    tuple of Missing
+        Those that somewhere reach the size from which their description in effects.yaml counts.
+    """
+    least = {balance: next(p.negligible for p in descriptions()[name].parameters if p.negligible)
+             for balance, (_, name, *_) in BALANCES.items()}
+    largest = dict.fromkeys(BALANCES, 0.0)
+    for one in free:
+        largest[one.balance] = max(largest[one.balance], float(np.max(np.abs(one.values))))
+    return (tuple(e for e in rest if float(np.max(np.abs(e.values))) >= least[e.balance]),
+            tuple(m for m in free if largest[m.balance] >= least[m.balance]))
+
+
 @dataclass(frozen=True)
 class Answer:
     """A verdict with its confidence, and the features that made it."""
@@ -212,8 +238,9 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     -------
     Answer
     """
-    left = max([0.0, *(e.evidence for e in rest), *(m.evidence for m in free)])
-    is_left = left > needed_evidence(rest, free)
+    needed = needed_evidence(rest, free)
+    rest, free = felt(rest, free)
+    is_left = max([0.0, *(e.evidence for e in rest), *(m.evidence for m in free)]) > needed
     explained = max([0.0, *(e.explained for e in rest), *(m.explained for m in free)])
     first = search.rounds[0]
     tried = first.tried
@@ -241,21 +268,27 @@ def _explained(search: Search) -> float:
 
 def unknown_finding(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> Finding:
     """Return what is missing without a name, by its best description."""
-    smooth, bursts = rest[0], max(free, key=lambda one: one.evidence)
-    is_smooth = smooth.evidence >= bursts.evidence
-    balance = smooth.balance if is_smooth else bursts.balance
+    rest, free = felt(rest, free)
+    smooth = max(rest, key=lambda one: one.evidence, default=None)
+    bursts = max(free, key=lambda one: one.evidence, default=None)
+    if smooth is not None and (bursts is None or smooth.evidence >= bursts.evidence):
+        balance, parts, most = smooth.balance, [smooth.values], smooth.evidence
+        regime = smooth.argument.replace('_', ' ')
+        how = f', a smooth function of {regime}'
+    else:
+        assert bursts is not None  # else nothing is left, and the verdict another one
+        balance, most, regime = bursts.balance, bursts.evidence, 'scattered times'
+        parts = [m.values for m in free if m.balance == balance]
+        how = f' at {regime}'
     where = {'force': 'a force on the chassis', 'moment': 'a yaw moment on the chassis',
              'torque_left': 'a torque on the left wheels',
              'torque_right': 'a torque on the right wheels'}[balance]
-    parts = [smooth.values] if is_smooth else [m.values for m in free if m.balance == balance]
     largest = max(float(np.max(np.abs(one), initial=0.0)) for one in parts)
     _, _, side, subsystem, unit = BALANCES[balance]
-    regime = smooth.argument.replace('_', ' ') if is_smooth else 'scattered times'
-    how = f', a smooth function of {regime}' if is_smooth else f' at {regime}'
     text = (f'No effect of the catalogue explains it; it is best described as {where}{how}, '
             f'up to {largest:.3g} {unit}.')
     elements = {'force': ('M_H',), 'moment': ('J_H',), 'torque_left': ('J_LW',),
                 'torque_right': ('J_RW',)}[balance]
     rivals = rivals_of(replace(search.rounds[0], adopted=False))
     return Finding('unknown', side, subsystem, elements, regime, None, (),
-                   max(smooth.evidence, bursts.evidence), float('nan'), 1.0, rivals, text)
+                   most, float('nan'), 1.0, rivals, text)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis.conclusion import answer
 from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit
@@ -15,9 +16,12 @@ from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.bursts import burst_evidence, levelled
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import beyond_chance
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import beyond_chance, Effort
 from lg_husky_sim.diagnosis.localisation import steady_knots
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.screening import Projection
+from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -71,6 +75,19 @@ def test_an_effort_in_slow_innovations_counts_for_less(fitted: tuple[Evidence, F
     most = evidence_beyond_chance(30)
     assert np.count_nonzero(chances[1] > most) >= 5
     assert np.count_nonzero(chances[0] > most) == 0
+
+
+def test_an_effort_too_small_to_count_is_not_missing(fitted: tuple[Evidence, Fit]) -> None:
+    """Whatever its evidence: a third of a newton moves no robot that anybody asks about."""
+    evidence, fit = fitted
+    search = Search(fit, fit, evidence, (Round(evidence, fit, (), False, 1.0),), ())
+
+    def said(size: float) -> Verdict:
+        effort = Effort('force', 'x', 60.0, 60.0, 0.0, 1.0, np.linspace(-size, size, 9),
+                        np.full(9, 0.01))
+        return answer(search, [effort], []).verdict
+    assert said(0.37) is Verdict.NOTHING_MISSING
+    assert said(7.0) is Verdict.UNKNOWN
 
 
 def test_bursts_are_looked_for_where_the_drive_is_steady(fitted: tuple[Evidence, Fit]) -> None:
