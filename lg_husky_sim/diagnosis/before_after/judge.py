@@ -13,7 +13,7 @@ from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Solution
 from lg_husky_sim.diagnosis.before_after.expansion import Expansion
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 
 class Weighed(Protocol):
@@ -162,4 +162,4 @@ def chance_of(solved: Solution, freedom: float, less: float = 0.0) -> float:
     """
     size = solved.shift.size
     square = float(solved.shift @ np.linalg.solve(solved.covariance, solved.shift)) - 2.0 * less
-    return float(fisher.sf(square / size, size, freedom))
+    return float(fdtrc(size, freedom, square / size))

@@ -21,7 +21,7 @@ import math
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.settings import setting
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 
 def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidence,
@@ -50,7 +50,7 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
     if hypothesis.onset is not None:
         seconds = sum(d.end - d.start for d in evidence.drives)
         count *= max(1.0, seconds / setting('onset_resolution'))
-    tail = float(chi2.sf(2.0 * max(gain, 0.0) / inflation, hypothesis.size))
+    tail = float(chdtrc(hypothesis.size, 2.0 * max(gain, 0.0) / inflation))
     return min(1.0, count * tail)
 
 

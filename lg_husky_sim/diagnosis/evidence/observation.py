@@ -16,13 +16,13 @@ import enum
 from hashlib import blake2b
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
+from lg_husky_sim.diagnosis.evidence.low_pass import low_passed
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant, SensorModel
 from lg_husky_sim.signals import BodyTwist, FloatArray, TimeSeries
 from lg_husky_sim.simulation.events import COLUMNS, Events, Propagator
 from lg_husky_sim.simulation.starting import commanded_until
 import numpy as np
-from scipy.signal import lfilter
 
 
 class WheelReading(enum.Enum):
@@ -260,14 +260,8 @@ def _signature(plant: Plant) -> bytes:
 
 def _rate(motion: Motion, drive: Drive, side: str, reading: Reading, late: float) -> FloatArray:
     if reading.wheels is WheelReading.FILTERED:
-        step = setting('filter_step')
-        # Exact for a rate that is straight within a step.
-        lag = max(reading.get('wheel_window'), 1e-6)
-        keep = np.exp(-step / lag)
-        share = lag / step * (1.0 - keep)
-        rate = motion.column(f'wheel_{side}', 'wheels')
-        followed = lfilter([1.0 - share, share - keep], [1.0, -keep], rate, zi=[
-            share * rate[0]])[0]
+        followed = low_passed(motion.column(f'wheel_{side}', 'wheels'), setting('filter_step'),
+                              max(reading.get('wheel_window'), 1e-6))
         found: FloatArray = np.interp(
             drive.wheel_times - late, motion.times[motion.wanted.parts['wheels']], followed)
         return found

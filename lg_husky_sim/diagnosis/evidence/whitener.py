@@ -27,6 +27,8 @@ from numpy.typing import NDArray
 
 Integers = NDArray[np.int64]
 
+#: Columns that machine code takes in one go; a few that are missing are cheaper filled up.
+TOGETHER = 32
 #: States of the deviation model: four disturbances, v, w, gyro bias, heading, x, y, two angles.
 STATES = 12
 #: Entries of the model vector, in the order in which the functions below read them.
@@ -46,24 +48,27 @@ PROCESS = ('force', 'moment', 'drive', 'force_time', 'moment_time', 'drive_time'
 
 
 @jit_part
-def _advance(z: FloatArray, j: int, dt: float, cosine: float, sine: float, fade_f: float,
-             fade_m: float, fade_d: float, m: FloatArray) -> None:
-    # One column of z over a short dt: the disturbances decay, the rest by Euler's rule.
-    force, moment, left, right = z[0, j], z[1, j], z[2, j], z[3, j]
-    v, w = z[4, j], z[5, j]
-    z[7, j] += dt * w
-    z[8, j] += dt * cosine * v
-    z[9, j] += dt * sine * v
-    z[10, j] += dt * (m[12] * v + m[13] * w + m[14] * left + m[15] * right)
-    z[11, j] += dt * (m[16] * v + m[17] * w + m[18] * left + m[19] * right)
-    z[4, j] = v + dt * (m[0] * v + m[1] * w + m[4] * force + m[5] * moment + m[6] * left
-                        + m[7] * right)
-    z[5, j] = w + dt * (m[2] * v + m[3] * w + m[8] * force + m[9] * moment + m[10] * left
-                        + m[11] * right)
-    z[0, j] = fade_f * force
-    z[1, j] = fade_m * moment
-    z[2, j] = fade_d * left
-    z[3, j] = fade_d * right
+def _advance(z: FloatArray, dt: float, cosine: float, sine: float, fade_f: float, fade_m: float,
+             fade_d: float, m: FloatArray) -> None:
+    # All columns of z over a short dt: the disturbances decay, the rest by Euler's rule. Numbers
+    # of the model are taken out first: they cannot change with z then, and columns go in vectors.
+    vv, vw, wv, ww = m[0], m[1], m[2], m[3]
+    vf, vm, vl, vr, wf, wm, wl, wr = m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]
+    lv, lw, ll, lr, rv, rw, rl, rr = m[12], m[13], m[14], m[15], m[16], m[17], m[18], m[19]
+    for j in range(z.shape[1]):
+        force, moment, left, right = z[0, j], z[1, j], z[2, j], z[3, j]
+        v, w = z[4, j], z[5, j]
+        z[7, j] += dt * w
+        z[8, j] += dt * cosine * v
+        z[9, j] += dt * sine * v
+        z[10, j] += dt * (lv * v + lw * w + ll * left + lr * right)
+        z[11, j] += dt * (rv * v + rw * w + rl * left + rr * right)
+        z[4, j] = v + dt * (vv * v + vw * w + vf * force + vm * moment + vl * left + vr * right)
+        z[5, j] = w + dt * (wv * v + ww * w + wf * force + wm * moment + wl * left + wr * right)
+        z[0, j] = fade_f * force
+        z[1, j] = fade_m * moment
+        z[2, j] = fade_d * left
+        z[3, j] = fade_d * right
 
 
 @jit_part
@@ -76,8 +81,48 @@ def _propagate(z: FloatArray, left: float, longest: float, cosine: float, sine: 
         fade_f = np.exp(-dt / process[3])
         fade_m = np.exp(-dt / process[4])
         fade_d = np.exp(-dt / process[5])
+        _advance(z, dt, cosine, sine, fade_f, fade_m, fade_d, m)
+
+
+@jit_part
+def _read_all(z: FloatArray, channel: int, m: FloatArray, seen: FloatArray) -> None:
+    # H z of one channel for all columns.
+    if channel < 2:
+        v, w = m[12 + 4 * channel], m[13 + 4 * channel]
+        left, right = m[14 + 4 * channel], m[15 + 4 * channel]
         for j in range(z.shape[1]):
-            _advance(z, j, dt, cosine, sine, fade_f, fade_m, fade_d, m)
+            seen[j] = v * z[4, j] + w * z[5, j] + left * z[2, j] + right * z[3, j]
+    elif channel == 2:
+        for j in range(z.shape[1]):
+            seen[j] = z[5, j] + z[6, j]
+    else:
+        state = 7
+        if channel == 3:
+            state = 8
+        elif channel == 4:
+            state = 9
+        elif channel == 6:
+            state = 10
+        elif channel == 7:
+            state = 11
+        for j in range(z.shape[1]):
+            seen[j] = z[state, j]
+
+
+@jit_part
+def _correct(z: FloatArray, gain: FloatArray, k: int, seen: FloatArray) -> None:
+    # Add gains times innovations.
+    for i in range(12):
+        by = gain[k, i]
+        for j in range(z.shape[1]):
+            z[i, j] += by * seen[j]
+
+
+@jit_part
+def _width(count: int) -> int:
+    # Columns with those that fill them up.
+    rest = count % TOGETHER
+    return count + TOGETHER - rest if 2 * rest >= TOGETHER else count
 
 
 @jit_part
@@ -168,11 +213,9 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
             fade_f = np.exp(-dt / force_time)
             fade_m = np.exp(-dt / moment_time)
             fade_d = np.exp(-dt / drive_time)
-            for j in range(12):
-                _advance(p, j, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+            _advance(p, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
             _transpose(p)
-            for j in range(12):
-                _advance(p, j, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+            _advance(p, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
             p[0, 0] += process[0] ** 2 * (1.0 - fade_f * fade_f)
             p[1, 1] += process[1] ** 2 * (1.0 - fade_m * fade_m)
             p[2, 2] += process[2] ** 2 * (1.0 - fade_d * fade_d)
@@ -227,19 +270,20 @@ def whiten(residuals: FloatArray, times: FloatArray, channels: Integers, order: 
         Receives the whitened innovations, in the order of time.
     """
     count = residuals.shape[1]
-    z = np.zeros((12, count))
+    width = _width(count)
+    z, seen = np.zeros((12, width)), np.zeros(width)
     now = times[order[0]]
     for k in range(order.size):
         reading = order[k]
         _propagate(z, times[reading] - now, longest, cosine[reading], sine[reading], process,
                    model)
         now = times[reading]
-        channel = int(channels[reading])
+        _read_all(z, int(channels[reading]), model, seen)
+        deviation = scale[k]
         for j in range(count):
-            innovation = residuals[reading, j] - _read(z, j, channel, model)
-            out[k, j] = innovation / scale[k]
-            for i in range(12):
-                z[i, j] += gain[k, i] * innovation
+            seen[j] = residuals[reading, j] - seen[j]
+            out[k, j] = seen[j] / deviation
+        _correct(z, gain, k, seen)
 
 
 @jit
@@ -275,10 +319,10 @@ def respond(efforts: FloatArray, grid: FloatArray, times: FloatArray, channels: 
             at = max(0, min(last, at))
             left -= dt
             now += dt
-            for j in range(count):
-                for i in range(4):
+            for i in range(4):
+                for j in range(count):
                     z[i, j] = efforts[at, i, j]
-                _advance(z, j, dt, cosine[reading], sine[reading], 1.0, 1.0, 1.0, model)
+            _advance(z, dt, cosine[reading], sine[reading], 1.0, 1.0, 1.0, model)
         now = times[reading]
         at = max(0, min(last, int((now - grid[0]) / spacing)))
         channel = int(channels[reading])
@@ -313,20 +357,22 @@ def whiten_switched(change: FloatArray, states: FloatArray, on: NDArray[np.uint8
         Receives the whitened innovations, in the order of time.
     """
     count = on.shape[1]
-    z = np.zeros((12, count))
+    width = _width(count)
+    z, seen = np.zeros((12, width)), np.zeros(width)
     now = times[order[0]]
     for k in range(order.size):
         reading = order[k]
         _propagate(z, times[reading] - now, longest, cosine[reading], sine[reading], process,
                    model)
         now = times[reading]
-        channel = int(channels[reading])
         for j in range(count):
             if k > 0 and on[k, j] != on[k - 1, j]:
                 sign = 1.0 if on[k, j] else -1.0
                 for i in range(4, 12):
                     z[i, j] += sign * states[k, i]
-            innovation = (change[reading] if on[k, j] else 0.0) - _read(z, j, channel, model)
-            out[k, j] = innovation / scale[k]
-            for i in range(12):
-                z[i, j] += gain[k, i] * innovation
+        _read_all(z, int(channels[reading]), model, seen)
+        moved, deviation = change[reading], scale[k]
+        for j in range(count):
+            seen[j] = (moved if on[k, j] else 0.0) - seen[j]
+            out[k, j] = seen[j] / deviation
+        _correct(z, gain, k, seen)

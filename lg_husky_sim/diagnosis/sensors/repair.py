@@ -19,7 +19,7 @@ from lg_husky_sim.diagnosis.result import Estimate, Finding
 from lg_husky_sim.diagnosis.sensors.faults import Fault
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.network import on_side
-from scipy.stats import norm
+from scipy.special import ndtr
 
 #: What the statement of such a fault ends in.
 UNMODELLED = 'No model of the robot is needed to see it.'
@@ -102,6 +102,6 @@ def fault_findings(found: Sequence[Fault], fit: Fit | None = None) -> tuple[Find
         made.append(Finding(
             fault.effect.id, fault.effect.side, kind.subsystem.value,
             on_side(kind.elements, fault.effect.side), 'everywhere', None, numbers, gain,
-            2.0 * float(norm.sf(fault.certainty)),
+            2.0 * float(ndtr(-fault.certainty)),
             min(1.0, gain / total), (), f'{fault.statement}. {UNMODELLED}'))
     return tuple(made)
