@@ -25,7 +25,7 @@ SETTINGS: dict[str, Any] = yaml.safe_load((ROOT / 'config' / 'diagnosis.yaml').r
 ENTRIES = {name: entry for section, entries in SETTINGS.items() if section != 'schema'
            for name, entry in entries.items()}
 #: Sizes of arrays, layouts and identities: no physics and no statistics.
-LAYOUT = {'STATES', 'BALANCES', 'NEUTRAL', 'LEAST_CHANCE'}
+LAYOUT = {'STATES', 'BALANCES', 'NEUTRAL', 'LEAST_CHANCE', 'TOGETHER'}
 #: Who may name an effect, and which: a wording.
 NAMED = {
     'conclusion.py': {'yaw_pull'},

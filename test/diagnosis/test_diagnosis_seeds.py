@@ -31,7 +31,7 @@ def _seeded(recording: Recording) -> tuple[Fit, list[Tried]]:
     with ThreadPoolExecutor(1) as pool:
         first = evidence_of(drives, [recording.name], start, first_guess(drives), pool)
         _, base = calibrated(first, start, 1)
-        return base, seeds_of(first, base, ())
+        return base, seeds_of(first, first.fit(start, rounds=1), base, ())
 
 
 def test_a_speed_loop_is_a_seed_where_the_numbers_of_the_robot_took_its_place(

@@ -86,7 +86,7 @@ def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]
     return evidence, evidence.fit(with_jitter(chosen.point, evidence))
 
 
-def seeds_of(first: Evidence, base: Fit, early: Sequence[Tried]) -> list[Tried]:
+def seeds_of(first: Evidence, rough: Fit, base: Fit, early: Sequence[Tried]) -> list[Tried]:
     """
     Return what to begin with where recalibrated numbers have taken the place of an effect.
 
@@ -94,10 +94,13 @@ def seeds_of(first: Evidence, base: Fit, early: Sequence[Tried]) -> list[Tried]:
     ----------
     first : Evidence
         Under a first guess of the noise.
+    rough : Fit
+        Of the nominal model under it, after one step.
     base : Fit
         Recalibrated.
     early : sequence of Tried
-        Effects that promised more than another reading of the sensors.
+        Effects that promised more there than another reading of the sensors; where there are
+        none, those that promise most at the nominal numbers are looked for.
 
     Returns
     -------
@@ -107,21 +110,20 @@ def seeds_of(first: Evidence, base: Fit, early: Sequence[Tried]) -> list[Tried]:
     """
     if 0.5 * float(np.sum(base.point.strain ** 2)) < setting('distorted'):
         return []
-    nominal = _nominal(base.point)
-    evidence = first.about(nominal)
-    rough = evidence.fit(nominal, rounds=1)
-    pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
-    begins = {one.hypothesis.label: (one.hypothesis, [(rough.point, one.numbers)])
-              for one in look(evidence, rough, pool)[:int(setting('early_effects'))]}
-    names = [u.name for u in rough.point.unknowns]
-    for one in early[:1]:
-        if [u.name for u in one.fit.point.unknowns[:len(names)]] == names:
-            there = rough.point.at(one.fit.point.places[:len(names)])
-            begins.setdefault(one.hypothesis.label, (one.hypothesis, []))[1].append(
-                (there, numbers_of(one)))
-    fits = [attempt(evidence, rough, hypothesis, [
-        *starts, *((starts[-1][0], own) for own in hypothesis.starts)], whole=False)
-        for hypothesis, starts in begins.values()]
+    names = [u.name for u in base.point.unknowns]
+    if early and names == [u.name for u in rough.point.unknowns]:
+        begins = [(early[0].hypothesis, early[0].fit.point.places[:len(names)],
+                   numbers_of(early[0]))]
+        evidence = first
+    else:
+        nominal = _nominal(base.point)
+        evidence = first.about(nominal)
+        rough = evidence.fit(nominal, rounds=1)
+        pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
+        begins = [(one.hypothesis, rough.point.places, one.numbers)
+                  for one in look(evidence, rough, pool)[:int(setting('early_effects'))]]
+    fits = [attempt(evidence, rough, hypothesis, [(rough.point.at(places), start) for start in (
+        numbers, *hypothesis.starts)], whole=False) for hypothesis, places, numbers in begins]
     tried = [one for one in fits if one is not None]
     if not tried:
         return []
@@ -135,6 +137,7 @@ class _Recalibrated:
     """The model as it is, with the noise and the reading of the log."""
 
     first: Evidence
+    rough: Fit
     early: Sequence[Tried]
     evidence: Evidence
     base: Fit
@@ -145,7 +148,7 @@ def _recalibrated(evidence: Evidence, start: Point) -> _Recalibrated:
     rough = evidence.fit(start, rounds=1)
     chosen, early = _as_logged(evidence, rough)
     start = _nominal(chosen.point)
-    return _Recalibrated(evidence, early, *calibrated(evidence.about(start), start))
+    return _Recalibrated(evidence, rough, early, *calibrated(evidence.about(start), start))
 
 
 def _at_ticks(known: _Recalibrated, start: Point, progress: Progress) -> _Recalibrated | None:
@@ -196,7 +199,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     if ticked is not None:
         known = ticked
     evidence, base = known.evidence, known.base
-    seeds = seeds_of(known.first, base, known.early)
+    seeds = seeds_of(known.first, known.rough, base, known.early)
     chosen, better = _as_logged(evidence, base)
     if seeds and seeds[0].gain > _promised(base, chosen):
         chosen, better = base, seeds
