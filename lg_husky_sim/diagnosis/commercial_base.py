@@ -100,12 +100,12 @@ def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
     prior = Prior(base.start, base.sd, np.ones(start.size, dtype=np.bool_))
     noise = first_noise(known)
     options = _options(base)
-    costs = [cost_at(base, drives, prior, noise, one, pool) for one in options]
+    costs = [cost_at(base, drives, prior, noise, one, pool.map) for one in options]
     z = options[int(np.argmin(costs))]
     steps, rough = int(setting('base_steps')), known.fit['roughly']
-    z = fit_set(base, drives, prior, noise, z, steps, rough, pool).z
+    z = fit_set(base, drives, prior, noise, z, steps, rough, pool.map).z
     noise = noise_of([residual(base, d, z) for d in drives], int(known.fit['filter']))
-    z = fit_set(base, drives, prior, noise, z, steps, rough, pool).z
+    z = fit_set(base, drives, prior, noise, z, steps, rough, pool.map).z
     values = dict(zip(base.names, map(float, base.values(z)), strict=True))
     model = fitted([started(nominal, values, known)], parts, int(known.fit['evaluations']), about)
     return CommercialBase(model, values)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+import math
 
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
 from lg_husky_sim.diagnosis.before_after.judge import is_beyond_chance
@@ -41,21 +42,19 @@ class Decision:
     chance: float = float('nan')
 
 
-def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], whole: Sequence[Candidate],
+def named_by(body: Sequence[Candidate], whole: Sequence[Candidate],
              numbers: Mapping[str, float]) -> Candidate | None:
     """
     Return the change that is claimed, if any.
 
     The motion of the body at the measured wheel rates decides first: a change of the loop leaves
-    it alone. Only a change of the loop that gains many times as much overrules it.
+    it alone. Only a change of the loop that gains many times as much overrules it. Where the body
+    says nothing, all channels decide.
 
     Parameters
     ----------
-    body, loop : sequence of Candidate
-        By gain, the largest first.
-    whole : sequence of Candidate
-        The changes of the body as all channels see them, which settles what the body's motion
-        leaves open.
+    body, whole : sequence of Candidate
+        As the motion of the body, and as all channels see them; by gain, the largest first.
     numbers : mapping of str to float
         ``decision`` of the settings.
 
@@ -63,14 +62,14 @@ def named_by(body: Sequence[Candidate], loop: Sequence[Candidate], whole: Sequen
     -------
     Candidate or None
     """
-    first = _settled(body, whole, numbers)
-    other = _simplest(loop, numbers)
-    options = [one for one in (first, other) if one is not None and is_beyond_chance(one, numbers)]
-    if len(options) == 2:
-        as_well = max((one.gain for one in whole if one.change is options[0].change), default=0.0)
-        if options[1].gain < max(numbers['loop_share'] * options[0].gain, as_well):
-            return options[0]
-    return max(options, key=lambda one: one.gain, default=None)
+    first, other = _settled(body, whole, numbers), _simplest(whole, numbers)
+    if first is None or not is_beyond_chance(first, numbers):
+        return other if other is not None and is_beyond_chance(other, numbers) else None
+    loop = _simplest([one for one in whole if one.change.block == 'loop'], numbers)
+    if loop is None or not is_beyond_chance(loop, numbers):
+        return first
+    as_well = max((one.gain for one in whole if one.change is first.change), default=0.0)
+    return first if loop.gain < max(numbers['loop_share'] * first.gain, as_well) else loop
 
 
 def _settled(body: Sequence[Candidate], whole: Sequence[Candidate], numbers: Mapping[str, float]
@@ -87,11 +86,11 @@ def _settled(body: Sequence[Candidate], whole: Sequence[Candidate], numbers: Map
 
 
 def _simplest(candidates: Sequence[Candidate], numbers: Mapping[str, float]) -> Candidate | None:
-    # Of a hypothesis and a part of it that gains as much, the part.
+    # Of a hypothesis and a part of it, the part, unless the rest gains beyond chance by itself.
     if not candidates:
         return None
-    best = candidates[0]
-    equal = [one for one in candidates if best.gain - one.gain < numbers['smaller']
+    best, least = candidates[0], -math.log(numbers['false_alarm_rate'])
+    equal = [one for one in candidates if best.gain - one.gain < least
              and is_beyond_chance(one, numbers)
              and set(one.change.parameters) < set(best.change.parameters)]
     return min(equal, key=lambda one: len(one.change.parameters), default=best)
@@ -114,14 +113,12 @@ def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
     """
     numbers = settings.decision
     bodily = () if body is None else body.candidates
-    looped = loop.candidates
-    named = named_by(bodily, looped, loop.others, numbers)
-    everything = sorted((*bodily, *looped), key=lambda one: -one.gain)
+    named = named_by(bodily, loop.candidates, numbers)
+    everything = sorted((*bodily, *loop.candidates), key=lambda one: -one.gain)
     blocks = [block for block in (body, loop) if block is not None]
     surest = min(blocks, key=lambda block: block.chance if block.anything > 0.0 else 1.0)
     gained = 0.0 if named is None else max(
-        one.gain for one in (named, *loop.others)
-        if one.change is named.change)
+        one.gain for one in (named, *loop.candidates) if one.change is named.change)
     rate = numbers['false_alarm_rate']
     if surest.anything > 0.0 and surest.chance < rate and (
             gained < numbers['unknown_share'] * surest.anything):
@@ -134,8 +131,8 @@ def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
         doubt = numbers['sure_doubt'] * min(float(np.log(max(least, 1e-300)) / np.log(rate)), 1.0)
         return Decision(None, _best_of_names(everything, ''), (),
                         _bounded(numbers['sure_nothing'] - doubt, numbers))
-    same = [one for one in everything if one.change.block == named.change.block]
-    rivals = _best_of_names(same, named.change.effect)
+    block = bodily if named in bodily else loop.candidates
+    rivals = _best_of_names(block, named.change.effect)
     second = max(rivals[0].gain, 0.0) if rivals else 0.0
     margin = float(np.clip(1.0 - second / named.gain, 0.0, 1.0))
     odds = _odds(named.chance, margin, numbers)

@@ -14,6 +14,7 @@ from lg_husky_sim.diagnosis.before_after.decision import decide, Decision
 from lg_husky_sim.diagnosis.before_after.drives import all_drives, Drive
 from lg_husky_sim.diagnosis.before_after.fitting import threads
 from lg_husky_sim.diagnosis.before_after.prediction import base_of, residual
+from lg_husky_sim.diagnosis.before_after.recording_fits import at_the_edge, fit_recordings
 from lg_husky_sim.diagnosis.before_after.runnable import carried, fitted, started
 from lg_husky_sim.diagnosis.before_after.settings import Settings, settings
 from lg_husky_sim.diagnosis.held_out import errors, split
@@ -88,26 +89,28 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
     recordings, baseline = named_apart(recordings, baseline)
     known = settings()
     before, after = _drives(baseline, known), _drives(recordings, known)
+    later = frozenset(drive.recording for drive in after)
     body = None
     with threads(jobs) as pool:
         intervals = [float(np.median(np.diff(d.wheels.times))) for d in (*before, *after)
                      if d.wheels.times.size > 1]
         streams = frozenset.intersection(*(frozenset(d.bins) for d in (*before, *after)))
-        base = base_of(known, nominal.parameters, True, max(intervals, default=0.0), streams)
+        base = at_the_edge(base_of(known, nominal.parameters, True, max(intervals, default=0.0),
+                                   streams), (*before, *after))
         begin = base.start
         if all(_shows_the_body(drive) for drive in (*before, *after)):
-            body = compare(base, before, after, begin, pool, lambda share: progress(
+            fits = fit_recordings(base, (*before, *after), begin, pool, lambda share: progress(
                 'motion of the body', 0.02 + 0.28 * share))
-            begin = body.before
-        loop = compare(replace(base, given=False), before, after, begin, pool,
-                       lambda share: progress('wheel loop and body', 0.3 + 0.5 * share))
+            body, begin = compare(fits, later), fits.common
+        loop = compare(fit_recordings(
+            replace(base, given=False), (*before, *after), begin, pool,
+            lambda share: progress('wheel loop and body', 0.3 + 0.5 * share)), later)
     decision = decide(body, loop, known)
     progress('model', 0.8)
-    earlier = tuple(s for r in baseline for s in segments(r))
-    later = tuple(s for r in recordings for s in segments(r))
-    return ChangeCase(_diagnosis(decision, body, loop, after, earlier, later, nominal, known,
+    parts, others = (tuple(s for r in rs for s in segments(r)) for rs in (recordings, baseline))
+    return ChangeCase(_diagnosis(decision, body, loop, after, others, parts, nominal, known,
                                  progress, _notes((*baseline, *recordings))),
-                      decision, body, loop, later, nominal)
+                      decision, body, loop, parts, nominal)
 
 
 def _drives(recordings: Sequence[Recording], known: Settings) -> tuple[Drive, ...]:

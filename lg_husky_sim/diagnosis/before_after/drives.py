@@ -84,6 +84,12 @@ class Drive:
     bins: Mapping[str, Bins]
     gyro: FloatArray
 
+    def largest_command(self, column: int) -> float:
+        """Return the largest command forward or in yaw (0 or 1), of either sign [m/s, rad/s]."""
+        gaps = np.diff(self.command_times)
+        sent = np.diff(self.command_sum[:, column])[gaps > 0.0] / gaps[gaps > 0.0]
+        return float(np.max(np.abs([*sent, self.command_last[column]])))
+
 
 def _binned(times: FloatArray, values: FloatArray, start: float, width: float) -> Bins:
     width = max(width, float(np.median(np.diff(times)))) if times.size > 1 else width

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -41,6 +42,15 @@ class Quadratic:
         """Return this for some of the parameters; it does not depend on the others."""
         return replace(self, curvature=self.curvature[np.ix_(index, index)],
                        slope=self.slope[index])
+
+    def curved(self, k: int, at: float, least: float) -> Quadratic:
+        """Return this with so much curvature at least along a parameter, about a value of it."""
+        more = max(least - float(self.curvature[k, k]), 0.0)
+        curvature, slope = np.array(self.curvature), np.array(self.slope)
+        curvature[k, k] += more
+        slope[k] += more * at
+        return replace(self, curvature=curvature, slope=slope,
+                       cost=self.cost + 0.5 * more * at ** 2)
 
     def varying(self, sd: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Return curvature, slope and log evidence with the recording's own deviation."""
@@ -141,71 +151,15 @@ class Evidence:
                 / (weight + len(self.quadratics))))
         return replace(found, change_sd=self.change_sd)
 
-    def modes(self, changed: NDArray[np.intp]) -> tuple[FloatArray, list[FloatArray]]:
-        """Return what is shared and differs, and each recording's likeliest parameters."""
-        at, _, _ = self._posterior(changed)
-        sd = self.recording_sd
-        found = []
-        for one in self.quadratics:
-            mean = self.level(at, changed, one.after)
-            inner = sd[:, None] * one.curvature * sd
-            inner[np.diag_indices(sd.size)] += 1.0
-            found.append(mean + sd * np.linalg.solve(
-                inner, sd * (one.slope - one.curvature @ mean)))
-        return at, found
-
-    def evidence_at(self, changed: NDArray[np.intp], at: FloatArray,
-                    places: Sequence[FloatArray]) -> float:
-        """
-        Return the log evidence about a point instead of the mode: what is sure of it.
-
-        Parameters
-        ----------
-        changed : numpy.ndarray of int
-            Which parameters differ after.
-        at : numpy.ndarray, shape (n + k,)
-            What is shared, and what differs.
-        places : sequence of numpy.ndarray
-            Parameters of each recording.
-
-        Returns
-        -------
-        float
-            [nats]
-        """
-        mode, own = self.modes(changed)
-        return (self.solve(changed).evidence + self._energy(changed, mode, own)
-                - self._energy(changed, at, places))
-
-    def level(self, at: FloatArray, changed: NDArray[np.intp], after: bool) -> FloatArray:
-        """Return the parameters of a set without its recordings' deviations."""
-        found = np.array(at[:self.mean.size])
-        if after:
-            found[changed] += at[self.mean.size:]
-        return found
-
-    def strain(self, changed: NDArray[np.intp], at: FloatArray, places: Sequence[FloatArray]
-               ) -> float:
-        """Return the negative log priors of a point, up to a constant [nats]."""
-        n = self.mean.size
-        total = 0.5 * float(np.sum(((at[:n] - self.mean) / self.sd) ** 2)
-                            + np.sum((at[n:] / self.change_sd[changed]) ** 2))
-        free = self.recording_sd > 0.0
-        for one, place in zip(self.quadratics, places, strict=True):
-            apart = (place - self.level(at, changed, one.after))[free] / self.recording_sd[free]
-            total += 0.5 * float(apart @ apart)
-        return total
-
-    def _energy(self, changed: NDArray[np.intp], at: FloatArray, places: Sequence[FloatArray]
-                ) -> float:
-        return self.strain(changed, at, places) + sum(
-            one.value(place) for one, place in zip(self.quadratics, places, strict=True))
-
     def solve(self, changed: NDArray[np.intp]) -> Solution:
         """Return the solution where the parameters of these indices differ after."""
         n = self.mean.size
         at, covariance, evidence = self._posterior(changed)
         return Solution(evidence, at[:n], at[n:], np.asarray(covariance[n:, n:], dtype=np.float64))
+
+    @cached_property
+    def _varying(self) -> list[tuple[FloatArray, FloatArray, float]]:
+        return [one.varying(self.recording_sd) for one in self.quadratics]
 
     def _posterior(self, changed: NDArray[np.intp]) -> tuple[FloatArray, FloatArray, float]:
         # Mean and covariance of what is shared and of what differs, and the log evidence.
@@ -218,8 +172,8 @@ class Evidence:
         precision[own, own] = 1.0 / self.change_sd[changed] ** 2
         prior = (-0.5 * float(np.sum((self.mean / self.sd) ** 2))
                  - float(np.sum(np.log(self.sd))) - float(np.sum(np.log(self.change_sd[changed]))))
-        for one in self.quadratics:
-            curvature, direction, constant = one.varying(self.recording_sd)
+        for one, (curvature, direction, constant) in zip(
+                self.quadratics, self._varying, strict=True):
             prior += constant
             precision[:n, :n] += curvature
             slope[:n] += direction
@@ -232,3 +186,14 @@ class Evidence:
         at = covariance @ slope
         evidence = prior + 0.5 * float(slope @ at) - 0.5 * float(np.linalg.slogdet(precision)[1])
         return at, np.asarray(covariance, dtype=np.float64), evidence
+
+
+def joined(parts: Sequence[Quadratic]) -> list[Quadratic]:
+    """Return the sums over the stretches of each recording, which share its deviation."""
+    found: dict[str, Quadratic] = {}
+    for part in parts:
+        there = found.get(part.recording)
+        found[part.recording] = part if there is None else Quadratic(
+            part.recording, part.after, there.curvature + part.curvature,
+            there.slope + part.slope, there.cost + part.cost)
+    return list(found.values())

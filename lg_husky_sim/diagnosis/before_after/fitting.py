@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from lg_husky_sim.blas import one_thread
 from lg_husky_sim.diagnosis.before_after.drives import Drive
@@ -20,8 +20,14 @@ from numpy.typing import NDArray
 
 Task = TypeVar('Task')
 Outcome = TypeVar('Outcome')
-#: Applies a function to tasks, in order.
-Mapper = Callable[[Callable[[Task], Outcome], Iterable[Task]], Iterable[Outcome]]
+
+
+class Mapper(Protocol):
+    """Applies a function to tasks, in order."""
+
+    def __call__(self, function: Callable[[Task], Outcome], tasks: Iterable[Task], /
+                 ) -> Iterable[Outcome]:
+        """Return what the function makes of each."""
 
 
 @contextmanager
@@ -71,9 +77,9 @@ class SetFit:
 
 
 def whites(base: Base, drives: Sequence[Drive], noise: Noise, z: FloatArray,
-           pool: ThreadPoolExecutor) -> list[FloatArray]:
+           each: Mapper) -> list[FloatArray]:
     """Return the whitened residuals of each drive."""
-    return list(pool.map(lambda drive: noise.white(residual(base, drive, z)), drives))
+    return list(each(lambda drive: noise.white(residual(base, drive, z)), drives))
 
 
 def _cost(errors: Sequence[FloatArray], prior: Prior, z: FloatArray) -> float:
@@ -82,13 +88,13 @@ def _cost(errors: Sequence[FloatArray], prior: Prior, z: FloatArray) -> float:
 
 
 def cost_at(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, z: FloatArray,
-            pool: ThreadPoolExecutor) -> float:
+            each: Mapper) -> float:
     """Return the negative log posterior [nats]; infinity where the simulation breaks down."""
-    return _cost(whites(base, drives, noise, z, pool), prior, z)
+    return _cost(whites(base, drives, noise, z, each), prior, z)
 
 
 def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, begin: FloatArray,
-            steps: int, enough: float, pool: ThreadPoolExecutor) -> SetFit:
+            steps: int, enough: float, each: Mapper) -> SetFit:
     """
     Fit by Gauss-Newton with Levenberg's damping.
 
@@ -105,7 +111,8 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
         With derivatives of their own, at most.
     enough : float
         A step that gains less ends the fit [nats].
-    pool : ThreadPoolExecutor
+    each : callable
+        Applies a function to the drives: `map`, or that of a pool.
 
     Returns
     -------
@@ -121,7 +128,7 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
         def one(drive: Drive, at: FloatArray = z) -> tuple[FloatArray, FloatArray]:
             rows, columns = jacobian(base, drive, at, free)
             return noise.white(rows), noise.white(columns)[:, free]
-        pairs = list(pool.map(one, drives))
+        pairs = list(each(one, drives))
         errors, derivatives = [e for e, _ in pairs], [j for _, j in pairs]
         cost = _cost(errors, prior, z)
         gram = np.diag(precision) + sum(j.T @ j for j in derivatives)
@@ -134,7 +141,7 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
             near[free] -= move
             near = np.clip(near, lower, upper)
             promised = 0.5 * float(slope @ move)
-            other = whites(base, drives, noise, near, pool)
+            other = whites(base, drives, noise, near, each)
             reached = _cost(other, prior, near)
             if reached >= cost:
                 damping *= 8.0

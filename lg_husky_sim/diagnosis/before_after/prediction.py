@@ -128,26 +128,37 @@ class Motion:
     path: FloatArray
 
 
-def moved(base: Base, drive: Drive, x: FloatArray) -> Motion:
-    """Simulate a drive; `x` in units."""
+def driven(base: Base, drive: Drive, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the command of each step, delayed, and the wheel rates; what is not used is zero."""
+    step = base.settings.simulation['step']
+    wheels, command = np.zeros((drive.steps + 1, 2)), np.zeros((drive.steps, 2))
+    value = x[base.names.index(_input_of(base))]
+    if base.given:
+        at = drive.start + step * np.arange(drive.steps + 1) + value
+        for k in range(2):
+            wheels[:, k] = np.interp(at, drive.wheels.times, drive.wheels.values[:, k])
+    else:
+        command = mean_command(drive, step, value)
+    return command, wheels
+
+
+def _input_of(base: Base) -> str:
+    # The only parameter on which that depends.
+    return 'wheels_late' if base.given else 'dead_time'
+
+
+def moved(base: Base, drive: Drive, x: FloatArray,
+          inputs: tuple[FloatArray, FloatArray] | None = None) -> Motion:
+    """Simulate a drive; `x` in units, `inputs` by :func:`driven` where they are known."""
     step = base.settings.simulation['step']
     names = base.names
     robot = np.concatenate([x[:len(ROBOT)], base.fixed])
     out = np.empty((drive.steps + 1, 7))
-    grid = drive.start + step * np.arange(drive.steps + 1)
-    late = x[names.index('wheels_late')]
     begin = np.array(drive.begin)
     mean_rim = (x[names.index('radius_left')] * begin[3]
                 + x[names.index('radius_right')] * begin[4]) / 2.0
     begin[0] = mean_rim
-    if base.given:
-        wheels = np.column_stack([
-            np.interp(grid + late, drive.wheels.times, drive.wheels.values[:, k])
-            for k in range(2)])
-        command = np.zeros((drive.steps, 2))
-    else:
-        wheels = np.zeros((drive.steps + 1, 2))
-        command = mean_command(drive, step, x[names.index('dead_time')])
+    command, wheels = driven(base, drive, x) if inputs is None else inputs
     simulate(robot, step, command, drive.level, wheels, base.given, begin, out)
     turn = 0.5 * step * (out[1:, 2] + out[:-1, 2])
     heading = np.concatenate([[0.0], np.cumsum(turn)])
@@ -256,11 +267,12 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
         Its derivatives, shape (n_bins, n_channels, n).
     """
     x = base.values(z)
-    motion = moved(base, drive, x)
+    inputs = driven(base, drive, x)
+    motion = moved(base, drive, x, inputs)
     there, should = measured(base, drive), predicted(base, drive, x, motion)
     columns = {name: np.zeros((*rows.shape, z.size)) for name, rows in should.items()}
     upper = base.bounds()[1]
-    again = {'dead_time', 'wheels_late'} if base.given is False else {'wheels_late'}
+    other_inputs = _input_of(base)
     for k, quantity in enumerate(base.settings.quantities):
         if not free[k]:
             continue
@@ -268,9 +280,11 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
         near = np.array(z)
         near[k] += delta
         changed = base.values(near)
-        same = k >= len(ROBOT) and quantity.name not in again
-        other = predicted(base, drive, changed,
-                          motion if same else moved(base, drive, changed))
+        if quantity.name == other_inputs:
+            path = moved(base, drive, changed)
+        else:
+            path = moved(base, drive, changed, inputs) if k < len(ROBOT) else motion
+        other = predicted(base, drive, changed, path)
         for name, rows in other.items():
             columns[name][:, :, k] = (should[name] - rows) / delta
     return {name: there[name] - should[name] for name in should}, columns

@@ -229,7 +229,7 @@ def test_a_change_without_a_name_is_unknown() -> None:
     z = base.start
     named = Candidate(known.changes[3], known.changes[3].parameters, 20.0, z[:2], z[:2], z[:2],
                       1e-4)
-    block = Block(base, z, z, first_noise(known), (named,), (), 200.0, 1e-6)
+    block = Block(base, z, z, first_noise(known), (named,), 200.0, 1e-6)
     decision = decide(None, block, known)
     assert decision.named is None
     assert decision.unnamed == 200.0

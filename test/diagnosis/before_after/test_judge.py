@@ -1,72 +1,106 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which of the differences that quadratics promise hold where these are looked at again."""
+"""When a difference of two sets of recordings is beyond chance."""
 
 from __future__ import annotations
 
-from typing import cast
+from collections.abc import Mapping
 
-from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
-from lg_husky_sim.diagnosis.before_after.expansion import Expansion
-from lg_husky_sim.diagnosis.before_after.judge import Claim, is_beyond_chance, Judge
+from lg_husky_sim.diagnosis.before_after.comparison import Block, compare, partitions
+from lg_husky_sim.diagnosis.before_after.evidence import Quadratic
+from lg_husky_sim.diagnosis.before_after.fitting import Prior
+from lg_husky_sim.diagnosis.before_after.judge import exchange_chance, is_beyond_chance
+from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of
+from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
 from lg_husky_sim.diagnosis.before_after.settings import settings
+from lg_husky_sim.diagnosis.before_after.whitening import first_noise
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.signals import FloatArray
 import numpy as np
-from numpy.typing import NDArray
+import pytest
 
-CHANGED = np.array([0])
-CURVATURE = 1e4
-
-
-def about(*values: float) -> Evidence:
-    """Return what two recordings before and two after say of one number, whose prior is wide."""
-    return Evidence([Quadratic(f'rec{k}', k > 1, np.array([[CURVATURE]]),
-                               np.array([CURVATURE * value]), 0.5 * CURVATURE * value ** 2)
-                     for k, value in enumerate(values)],
-                    np.zeros(1), np.ones(1), np.array([0.01]), np.ones(1))
+NAMES = ('a', 'b', 'c', 'd', 'e', 'f')
+LATER = frozenset('def')
+#: What each recording says of a parameter, as a share of its assumed deviation.
+PRECISION = 0.2
 
 
-class Modes:
-    """An expansion whose evidence about what a change, or none, makes likeliest is given."""
-
-    def __init__(self, changed: float, nothing: float) -> None:
-        self.found = {CHANGED.size: changed, 0: nothing}
-
-    def evidence(self, linear: Evidence, changed: NDArray[np.intp]) -> float:
-        return self.found[changed.size]
+def body() -> Base:
+    return base_of(settings(), load_model().parameters, given=True)
 
 
-SEEN = about(0.0, 0.01, 1.0, 1.01)
-ALIKE = about(0.0, 1.01, 0.01, 1.0)
-NOTHING = SEEN.solve(np.zeros(0, dtype=np.intp)).evidence
+def said(places: Mapping[str, FloatArray], later: frozenset[str] = LATER) -> Block:
+    """Return what is made of recordings that are likeliest there."""
+    base = body()
+    quantities = settings().quantities
+    free = np.array([q.name in settings().body for q in quantities])
+    prior = Prior(base.start, base.sd, free)
+    curvature = np.diag([1.0 / (PRECISION * max(q.recording, 1e-4)) ** 2 for q in quantities])
+    return compare(RecordingFits(base, prior, first_noise(settings()), base.start, places, tuple(
+        Quadratic(name, False, curvature, curvature @ z, 0.5 * float(z @ curvature @ z))
+        for name, z in places.items())), later)
 
 
-def checked(common: Evidence, changed: float, nothing: float) -> tuple[Claim, Claim]:
-    """Return a claim by quadratics about the sets' fits, and what holds of it."""
-    judge = Judge(SEEN, common, cast(Expansion, Modes(changed, nothing)), 10.0,
-                  settings().decision)
-    claim = judge.claim(CHANGED, 1)
-    return claim, judge.checked([claim])[0]
+def recorded(seed: int, times: float = 1.0, shift: float = 0.0) -> dict[str, FloatArray]:
+    """Return recordings that deviate by so much more than assumed, and a change of one radius."""
+    base, rng = body(), np.random.default_rng(seed)
+    deviation = np.array([q.recording for q in settings().quantities])
+    places = {name: base.start + times * deviation * rng.standard_normal(deviation.size)
+              for name in NAMES}
+    for name in LATER:
+        places[name][base.names.index('radius_left')] += shift
+    return places
 
 
-def test_a_claim_that_neither_fit_bears_out_is_chance() -> None:
-    claim, held = checked(ALIKE, NOTHING, NOTHING)
-    assert is_beyond_chance(claim, settings().decision)
-    assert not is_beyond_chance(held, settings().decision)
+def test_robots_that_have_not_changed_are_flagged_at_the_stated_rate() -> None:
+    """Though what the base leaves out makes recordings differ by eight times what is assumed."""
+    flagged = sum(is_beyond_chance(said(recorded(seed, 8.0)).candidates[0], settings().decision)
+                  for seed in range(12))
+    assert flagged <= 1  # of 12 at 2 %; two or more have a chance of 2 %
 
 
-def test_a_claim_that_the_common_fit_bears_out_keeps_its_gain() -> None:
-    claim, held = checked(SEEN, NOTHING, NOTHING)
-    assert held.gain == claim.gain > 0.0
-    assert held.chance == claim.chance
+def test_a_change_among_deviations_is_named() -> None:
+    best = said(recorded(1, 3.0, 0.03)).candidates[0]
+    assert (best.change.effect, best.change.side) == ('wheel_radius_mismatch', 'left')
+    assert is_beyond_chance(best, settings().decision)
+    assert best.shift[0] == pytest.approx(0.03, rel=0.1)
 
 
-def test_a_claim_far_from_the_common_fit_gains_what_its_own_mode_does() -> None:
-    claim, held = checked(ALIKE, NOTHING + 50.0, NOTHING)
-    assert is_beyond_chance(held, settings().decision)
-    np.testing.assert_allclose(held.gain, 50.0)
-    assert held.gain < claim.gain
+def test_a_difference_between_other_recordings_is_no_change() -> None:
+    """Two recordings of each set differ from the rest."""
+    places = recorded(2)
+    for name in 'aef':
+        places[name][body().names.index('radius_left')] += 0.03
+    assert not is_beyond_chance(said(places).candidates[0], settings().decision)
+    assert is_beyond_chance(said(places, frozenset('aef')).candidates[0], settings().decision)
 
 
-def test_what_no_change_gains_by_its_own_mode_is_taken_off() -> None:
-    claim, held = checked(SEEN, NOTHING, NOTHING + 2.0)
-    np.testing.assert_allclose(claim.gain - held.gain, 2.0)
+def test_which_set_came_first_and_the_order_of_recordings_do_not_matter() -> None:
+    places = recorded(3, 1.0, 0.02)
+    one = said(places)
+    other = said(dict(reversed(places.items())), frozenset('abc'))
+    assert one.candidates[0].change == other.candidates[0].change
+    assert one.candidates[0].gain == pytest.approx(other.candidates[0].gain, rel=0.02)
+    assert one.candidates[0].shift == pytest.approx(-other.candidates[0].shift, rel=0.02)
+
+
+@pytest.mark.parametrize(('names', 'later', 'count'), [
+    ('abcdef', 'def', 9), ('abcd', 'cd', 2), ('ab', 'b', 0), ('abcd', 'd', 3),
+    ('abcde', 'de', 9), ('abcdefghijklmnop', 'ijklmnop', 30)])
+def test_all_other_ways_to_part_recordings_are_tried(names: str, later: str, count: int) -> None:
+    ways = partitions(names, frozenset(later), 30)
+    assert ways == partitions(names[::-1], frozenset(later), 30)
+    assert len({frozenset([way, frozenset(names) - way]) for way in ways}) == count == len(ways)
+    assert all(len(way) == len(later) or 2 * len(later) == len(names) for way in ways)
+    assert frozenset(later) not in ways
+    assert 2 * len(later) != len(names) or frozenset(names) - frozenset(later) not in ways
+
+
+def test_a_gain_is_rare_where_it_is_far_above_those_of_other_partitions() -> None:
+    rng = np.random.default_rng(4)
+    drawn = 20.0 * rng.exponential(size=(4000, 10))
+    chances = [exchange_chance(row[0], list(row[1:]), 1e-9) for row in drawn]
+    for rate in (0.02, 0.1):
+        assert np.mean(np.array(chances) < rate) == pytest.approx(rate, abs=0.01)
+    assert exchange_chance(-5.0, [1.0, 2.0], 1.0) == 1.0
+    assert exchange_chance(1000.0, [-3.0] * 9, 1.0) < 1e-15

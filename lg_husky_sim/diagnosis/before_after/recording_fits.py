@@ -1,0 +1,225 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The base fitted to each recording by itself, whichever set it is of.
+
+Which recordings are of which set is not used here. So two sets of one robot cannot end on
+different summits of the likelihood, and a fit that fails adds to what recordings of a set differ
+by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+from lg_husky_sim.diagnosis.before_after.drives import Drive
+from lg_husky_sim.diagnosis.before_after.evidence import Evidence, joined, Quadratic
+from lg_husky_sim.diagnosis.before_after.fitting import cost_at, fit_set, Prior, SetFit
+from lg_husky_sim.diagnosis.before_after.prediction import Base, jacobian, residual
+from lg_husky_sim.diagnosis.before_after.whitening import first_noise, Noise, noise_of
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+#: Told how far it is (0 to 1).
+Share = Callable[[float], None]
+#: Parameters by recording, on the scale of the estimates.
+Places = Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingFits:
+    """
+    The base fitted to each recording.
+
+    Parameters
+    ----------
+    base : Base
+    prior : Prior
+        Of the parameters, without what is known of them by other recordings.
+    noise : Noise
+    common : numpy.ndarray, shape (n,)
+        Mean of the recordings, on the scale of the estimates.
+    places : mapping of str to numpy.ndarray, shape (n,)
+        Where each recording is likeliest.
+    quadratics : tuple of Quadratic
+        The likelihood of each recording about its own fit, for all parameters.
+    """
+
+    base: Base
+    prior: Prior
+    noise: Noise
+    common: FloatArray
+    places: Places
+    quadratics: tuple[Quadratic, ...]
+
+
+def fit_recordings(base: Base, drives: Sequence[Drive], begin: FloatArray,
+                   pool: ThreadPoolExecutor, share: Share) -> RecordingFits:
+    """
+    Fit the base to each recording.
+
+    The longest is fitted first, from every kind of robot; the others begin there, or where any
+    start is likelier. Then all are fitted twice more, with a prior about their mean that is as
+    wide as a change, and each may begin where any other ended, or at a start from there.
+
+    Parameters
+    ----------
+    base : Base
+    drives : sequence of Drive
+    begin : numpy.ndarray, shape (n,)
+        Where the fits begin.
+    pool : ThreadPoolExecutor
+    share : callable
+        Told how far it is (0 to 1).
+
+    Returns
+    -------
+    RecordingFits
+    """
+    numbers = base.settings.fit
+    quantities = base.settings.quantities
+    free = np.array([not base.given or q.name in base.settings.body for q in quantities])
+    prior = Prior(base.start, base.sd, free)
+    steps, enough, roughly = int(numbers['steps']), numbers['enough'], numbers['roughly']
+    noise = first_noise(base.settings)
+    groups: dict[str, list[Drive]] = {}
+    for drive in drives:
+        groups.setdefault(drive.recording, []).append(drive)
+    longest = max(groups, key=lambda name: sum(d.steps for d in groups[name]))
+    kinds = _kinds(base, prior, begin)
+    firsts = list(pool.map(lambda start: fit_set(
+        base, groups[longest], prior, noise, start, steps, roughly, map), kinds))
+    first = min(firsts, key=lambda fit: fit.cost).z
+    share(0.2)
+
+    def fitted(name: str, about: Prior, options: Sequence[FloatArray], until: float
+               ) -> SetFit:
+        costs = [cost_at(base, groups[name], about, noise, one, map) for one in options]
+        return fit_set(base, groups[name], about, noise, options[int(np.argmin(costs))], steps,
+                       until, map)
+    names = list(groups)
+    options = [*kinds, *_shifted(base, free, first)]
+    places = dict(zip(names, pool.map(lambda name: first if name == longest else fitted(
+        name, prior, options, roughly).z, names), strict=True))
+    share(0.4)
+    noise = _renewed(base, groups, places)
+    wide = np.array([np.hypot(q.recording, q.change) for q in quantities])
+    for turn, until in enumerate((roughly, enough)):
+        common = _mean(base, prior, wide, places, _quadratics(
+            base, groups, noise, prior, places, pool))
+        about = Prior(common, wide, free)
+        others = [one for other in (common, *places.values()) for one in (
+            [other] if turn else _shifted(base, free, other))]
+
+        def again(name: str, about: Prior = about, others: Sequence[FloatArray] = others,
+                  places: Places = places, until: float = until) -> FloatArray:
+            fits = [fitted(name, about, [places[name]], until), fitted(name, about, [
+                one for one in others if one is not places[name]], until)]
+            return min(fits, key=lambda fit: fit.cost).z
+        places = dict(zip(names, pool.map(again, names), strict=True))
+        share(0.65 + 0.2 * turn)
+        if not turn:
+            noise = _renewed(base, groups, places)
+    found = _quadratics(base, groups, noise, prior, places, pool)
+    share(1.0)
+    return RecordingFits(base, prior, noise, common, places, tuple(
+        _with_limits(base, groups[one.recording], noise, prior, places, one) for one in found))
+
+
+def at_the_edge(base: Base, drives: Sequence[Drive]) -> Base:
+    """Return a base whose limits of commands are the largest that were sent; none is refuted."""
+    start = np.array(base.start)
+    for column, name in enumerate(('limit_forward', 'limit_yaw')):
+        largest = max(drive.largest_command(column) for drive in drives)
+        if largest > 0.0:
+            start[base.names.index(name)] = base.place(name, largest)
+    return replace(base, start=np.clip(start, *base.bounds()))
+
+
+def quadratic(base: Base, drive: Drive, noise: Noise, z: FloatArray, prior: Prior) -> Quadratic:
+    """
+    Return the quadratic of a drive about a point on the scale of the estimates.
+
+    With residuals e and their derivatives J at z, whitened, the negative log likelihood is::
+
+        |e + J (x - z)|^2 / 2 = x' J'J x / 2 - (J'J z - J'e)' x + |e - J z|^2 / 2
+    """
+    rows, columns = jacobian(base, drive, z, prior.free)
+    e, j = noise.white(rows), noise.white(columns)
+    curvature, slope = j.T @ j, j.T @ e
+    return Quadratic(drive.recording, False, curvature, curvature @ z - slope,
+                     0.5 * float(e @ e) - float(z @ slope) + 0.5 * float(z @ curvature @ z))
+
+
+def _kinds(base: Base, prior: Prior, begin: FloatArray) -> list[FloatArray]:
+    # Where the kinds of robot are the same for this block, once.
+    names, found = base.names, [begin]
+    for kind in base.kinds:
+        start = np.array(begin)
+        for name, value in kind.items():
+            k = names.index(name)
+            if prior.free[k]:
+                start[k] = base.place(name, value)
+        if not any(np.array_equal(start, one) for one in found):
+            found.append(start)
+    return found
+
+
+def _shifted(base: Base, free: FloatArray, begin: FloatArray) -> list[FloatArray]:
+    names, (lower, upper) = base.names, base.bounds()
+    found = [begin]
+    for entry in base.settings.starts:
+        if all(free[names.index(name)] for name in entry):
+            one = np.array(begin)
+            for name, value in entry.items():
+                one[names.index(name)] += value
+            found.append(np.clip(one, lower, upper))
+    return found
+
+
+def _renewed(base: Base, groups: Mapping[str, Sequence[Drive]], places: Places) -> Noise:
+    return noise_of([residual(base, d, places[name]) for name, ds in groups.items() for d in ds],
+                    int(base.settings.fit['filter']))
+
+
+def _quadratics(base: Base, groups: Mapping[str, Sequence[Drive]], noise: Noise, prior: Prior,
+                places: Places, pool: ThreadPoolExecutor) -> list[Quadratic]:
+    return joined(list(pool.map(
+        lambda drive: quadratic(base, drive, noise, places[drive.recording], prior),
+        [d for ds in groups.values() for d in ds])))
+
+
+def _mean(base: Base, prior: Prior, wide: FloatArray, places: Places,
+          quadratics: Sequence[Quadratic]) -> FloatArray:
+    # A limit is the highest of all recordings: where none is reached, none is told.
+    index = np.flatnonzero(prior.free)
+    z = np.array(prior.mean)
+    z[index] = Evidence([q.among(index) for q in quadratics], prior.mean[index], prior.sd[index],
+                        wide[index], wide[index]).solve(np.zeros(0, dtype=np.intp)).shared
+    for k, quantity in enumerate(base.settings.quantities):
+        if prior.free[k] and quantity.name in base.settings.limits:
+            z[k] = max(place[k] for place in places.values())
+    return np.clip(z, *base.bounds())
+
+
+def _with_limits(base: Base, drives: Sequence[Drive], noise: Noise, prior: Prior, places: Places,
+                 near: Quadratic) -> Quadratic:
+    # A limit that is not reached has no derivative: put the lowest of all recordings in.
+    z = places[near.recording]
+
+    def cost(at: FloatArray) -> float:
+        return 0.5 * sum(float(e @ e) for e in (
+            noise.white(residual(base, d, at)) for d in drives))
+    here = near.value(z)
+    for k, quantity in enumerate(base.settings.quantities):
+        lowest = min(place[k] for place in places.values())
+        apart = float(lowest - z[k])
+        if not prior.free[k] or quantity.name not in base.settings.limits or (
+                abs(apart) < prior.sd[k] * base.settings.fit['limit_apart']):
+            continue
+        there = np.array(z)
+        there[k] = lowest
+        near = near.curved(k, z[k], 2.0 * (cost(there) - here) / apart ** 2)
+    return near
