@@ -4,19 +4,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 import math
 
-from lg_husky_sim.diagnosis.before_after.evidence import Evidence
-from lg_husky_sim.diagnosis.before_after.judge import chance_of, exchange_chance
+from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
+from lg_husky_sim.diagnosis.before_after.judge import exchange_chance
 from lg_husky_sim.diagnosis.before_after.prediction import Base
 from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
 from lg_husky_sim.diagnosis.before_after.settings import Change
 from lg_husky_sim.diagnosis.before_after.whitening import Noise
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 #: Ways to part recordings above which they are drawn and not listed.
 _ENUMERATED = 2000
@@ -84,10 +85,10 @@ def compare(fits: RecordingFits, later: Collection[str]) -> Block:
     """
     Weigh every change, and how probable its gain is where nothing has changed.
 
-    The fits do not know which recordings are of which set. Where nothing has changed, the sets as
-    they are may therefore gain no more than the same recordings parted in any other way into two
-    sets of these sizes, which is what their gains are held against. Where there is no other way,
-    the shifts are judged by what the recordings of a set differ by.
+    The fits do not know which recordings are of which set. So a gain is held against those of the
+    same recordings parted in any other way into two sets of these sizes, once what is claimed to
+    have changed is taken out of the later ones (permutation of the residuals, ter Braak 1992), and
+    against what unchanged robots gain.
 
     Parameters
     ----------
@@ -99,19 +100,31 @@ def compare(fits: RecordingFits, later: Collection[str]) -> Block:
     -------
     Block
     """
-    block = _weighed(fits, later)
-    numbers = fits.base.settings.decision
-    others = [_weighed(fits, names) for names in partitions(
-        [one.recording for one in fits.quadratics], later, int(numbers['partitions']))]
-    if not others:
-        return block
-
-    def chance(gain: float, gains: Iterable[float]) -> float:
-        return exchange_chance(gain, list(gains), numbers['least_gain'])
-    return replace(
-        block, candidates=tuple(replace(one, chance=chance(
-            one.gain, (o.candidates[0].gain for o in others))) for one in block.candidates),
-        chance=chance(block.anything, (o.anything for o in others)))
+    comparison = _Comparison(fits)
+    numbers, n = comparison.numbers, comparison.index.size
+    evidence = comparison.evidence(comparison.quadratics, later)
+    candidates = comparison.candidates(evidence)
+    every = evidence.solve(comparison.everything)
+    anything = every.evidence - evidence.nothing
+    best, all_of_it = np.zeros(n), np.zeros(n)
+    best[comparison.places(candidates[0].parameters)] = candidates[0].shift
+    all_of_it[comparison.everything] = every.shift
+    gains, wholes = [], []
+    for way in partitions([q.recording for q in fits.quadratics], later,
+                          int(numbers['partitions'])):
+        gains.append(comparison.candidates(comparison.evidence(
+            comparison.without(best, later), way))[0].gain)
+        other = comparison.evidence(comparison.without(all_of_it, later), way)
+        wholes.append(other.solve(comparison.everything).evidence - other.nothing)
+    before = np.array(fits.prior.mean)
+    before[comparison.index] = every.shared
+    after = np.array(before)
+    after[comparison.index] += all_of_it
+    bounds = fits.base.bounds()
+    return Block(
+        fits.base, np.clip(before, *bounds), np.clip(after, *bounds), fits.noise,
+        tuple(replace(one, chance=exchange_chance(one.gain, gains, numbers))
+              for one in candidates), anything, exchange_chance(anything, wholes, numbers))
 
 
 def partitions(names: Sequence[str], later: Collection[str], most: int) -> list[frozenset[str]]:
@@ -152,39 +165,51 @@ def partitions(names: Sequence[str], later: Collection[str], most: int) -> list[
     return ways
 
 
-def _weighed(fits: RecordingFits, later: Collection[str]) -> Block:
-    base, prior = fits.base, fits.prior
-    settings, numbers = base.settings, base.settings.fit
-    quantities = settings.quantities
-    index = np.flatnonzero(prior.free)
-    place = {quantities[k].name: i for i, k in enumerate(index)}
-    shown = 'body' if base.given else 'loop'
-    weight = numbers[f'recordings_{shown}']
-    evidence = Evidence(
-        [replace(q.among(index), after=q.recording in later) for q in fits.quadratics],
-        prior.mean[index], prior.sd[index], np.array([quantities[k].recording for k in index]),
-        np.array([quantities[k].change for k in index])).estimated(
-            weight, int(numbers['recording_rounds']), numbers['recording_free'])
-    freedom = max(weight + len(evidence.quadratics) - 2.0, 1.0)
-    nothing = evidence.solve(np.zeros(0, dtype=np.intp)).evidence
-    changes = [c for c in settings.changes if c.block == 'body' or not base.given]
-    found = []
-    for change in changes:
-        names = change.parameters if base.given else (*change.parameters, *change.more)
-        changed = np.array([place[name] for name in names], dtype=np.intp)
-        solved = evidence.solve(changed)
-        found.append(Candidate(
-            change, names, solved.evidence - nothing, solved.shared[changed], solved.shift,
-            np.sqrt(np.diag(solved.covariance)),
-            min(1.0, len(changes) * chance_of(solved, freedom))))
-    found.sort(key=lambda one: -one.gain)
-    # Delays of all streams are none: that of the reference is left out where all may differ.
-    free = np.array([i for i, k in enumerate(index) if k != base.reference], dtype=np.intp)
-    every = evidence.solve(free)
-    before = np.array(prior.mean)
-    before[index] = every.shared
-    after = np.array(before)
-    after[index[free]] += every.shift
-    bounds = base.bounds()
-    return Block(base, np.clip(before, *bounds), np.clip(after, *bounds), fits.noise,
-                 tuple(found), every.evidence - nothing, chance_of(every, freedom))
+class _Comparison:
+    """The recordings' quadratics in the parameters that are free, and the changes of them."""
+
+    def __init__(self, fits: RecordingFits) -> None:
+        self.fits = fits
+        self.numbers = fits.base.settings.decision
+        self.index = np.flatnonzero(fits.prior.free)
+        self.quadratics = [one.among(self.index) for one in fits.quadratics]
+        quantities = fits.base.settings.quantities
+        self._place = {quantities[k].name: i for i, k in enumerate(self.index)}
+        # Delays of all streams are none: that of the reference is left out where all may differ.
+        self.everything = np.array([i for i, k in enumerate(self.index)
+                                    if k != fits.base.reference], dtype=np.intp)
+
+    def places(self, names: Sequence[str]) -> NDArray[np.intp]:
+        """Return where parameters of these names are."""
+        return np.array([self._place[name] for name in names], dtype=np.intp)
+
+    def without(self, shift: FloatArray, later: Collection[str]) -> list[Quadratic]:
+        """Return the recordings with a shift taken out of the later ones."""
+        return [one.less(shift) if one.recording in later else one for one in self.quadratics]
+
+    def evidence(self, quadratics: Sequence[Quadratic], later: Collection[str]) -> Evidence:
+        """Return the evidence with the deviations that recordings of these sets have."""
+        base, index, prior = self.fits.base, self.index, self.fits.prior
+        quantities, numbers = base.settings.quantities, base.settings.fit
+        return Evidence(
+            [replace(one, after=one.recording in later) for one in quadratics],
+            prior.mean[index], prior.sd[index],
+            np.array([quantities[k].recording for k in index]),
+            np.array([quantities[k].change for k in index])).estimated(
+                numbers['recordings_body' if base.given else 'recordings_loop'],
+                int(numbers['recording_rounds']), numbers['recording_free'])
+
+    def candidates(self, evidence: Evidence) -> list[Candidate]:
+        """Return every change with its gain, the largest first; their chance is not known yet."""
+        base, found = self.fits.base, []
+        for change in base.settings.changes:
+            if base.given and change.block != 'body':
+                continue
+            more = () if base.given else change.more
+            names = (*change.parameters, *more, *change.aside)
+            changed = self.places(names)
+            solved = evidence.solve(changed)
+            found.append(Candidate(
+                change, names, solved.evidence - evidence.nothing, solved.shared[changed],
+                solved.shift, np.sqrt(np.diag(solved.covariance)), 1.0))
+        return sorted(found, key=lambda one: -one.gain)

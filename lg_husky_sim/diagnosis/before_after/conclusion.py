@@ -28,11 +28,13 @@ _NAMES = {'left': ('wheel_left', 'drivetrain'), 'right': ('wheel_right', 'drivet
 
 
 def estimates(one: Candidate, settings: Settings) -> tuple[Estimate, ...]:
-    """Return the parameters of a change as they are after it, with 95 % intervals."""
+    """Return what a change tells of its parameters after it, with 95 % intervals."""
     wide = settings.decision['confidence_z'] * one.sd
     known = {q.name: q for q in settings.quantities}
     found = []
     for k, name in enumerate(one.parameters):
+        if name in one.change.aside:
+            continue
         quantity = known[name]
         at = one.before[k] + one.shift[k]
         value, low, high = (_value(quantity, at + side * wide[k]) for side in (0.0, -1.0, 1.0))

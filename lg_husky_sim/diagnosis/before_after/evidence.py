@@ -43,6 +43,12 @@ class Quadratic:
         return replace(self, curvature=self.curvature[np.ix_(index, index)],
                        slope=self.slope[index])
 
+    def less(self, shift: FloatArray) -> Quadratic:
+        """Return this as a function of the parameters less a shift of them."""
+        moved = self.curvature @ shift
+        return replace(self, slope=self.slope - moved, cost=self.cost + float(
+            0.5 * shift @ moved - self.slope @ shift))
+
     def curved(self, k: int, at: float, least: float) -> Quadratic:
         """Return this with so much curvature at least along a parameter, about a value of it."""
         more = max(least - float(self.curvature[k, k]), 0.0)
@@ -156,6 +162,11 @@ class Evidence:
         n = self.mean.size
         at, covariance, evidence = self._posterior(changed)
         return Solution(evidence, at[:n], at[n:], np.asarray(covariance[n:, n:], dtype=np.float64))
+
+    @cached_property
+    def nothing(self) -> float:
+        """Log evidence of no change [nats]."""
+        return self.solve(np.zeros(0, dtype=np.intp)).evidence
 
     @cached_property
     def _varying(self) -> list[tuple[FloatArray, FloatArray, float]]:

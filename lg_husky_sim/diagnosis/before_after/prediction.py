@@ -205,10 +205,12 @@ def predicted(base: Base, drive: Drive, x: FloatArray, motion: Motion) -> dict[s
                              motion.out[:, [2, 5, 6]]))
         rate = rows[:, 0]
         turning = np.gradient(rate, base.settings.bins['yaw'])
+        # Of the IMU from the centre of mass, whose acceleration is simulated.
+        ahead, aside = value['imu_x'] - value['com_x'], -value['com_y']
         found['imu'] = np.column_stack([
             value['gyro_factor'] * rate + value['gyro_bias'],
-            rows[:, 1] - value['imu_x'] * rate ** 2 + value['accel_bias_x'],
-            rows[:, 2] + value['imu_x'] * turning + value['accel_bias_y']])
+            rows[:, 1] - ahead * rate ** 2 - aside * turning + value['accel_bias_x'],
+            rows[:, 2] + ahead * turning - aside * rate ** 2 + value['accel_bias_y']])
     if 'pose' in drive.bins:
         bins = drive.bins['pose']
         path = bins.mean(_at(bins.times - value['pose_late'], drive.start, step, motion.path))

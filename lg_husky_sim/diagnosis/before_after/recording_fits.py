@@ -96,9 +96,13 @@ def fit_recordings(base: Base, drives: Sequence[Drive], begin: FloatArray,
 
     def fitted(name: str, about: Prior, options: Sequence[FloatArray], until: float
                ) -> SetFit:
-        costs = [cost_at(base, groups[name], about, noise, one, map) for one in options]
-        return fit_set(base, groups[name], about, noise, options[int(np.argmin(costs))], steps,
-                       until, map)
+        def fit(start: FloatArray, at_most: int) -> SetFit:
+            return fit_set(base, groups[name], about, noise, start, at_most, until, map)
+        nearest = sorted(options, key=lambda one: cost_at(
+            base, groups[name], about, noise, one, map))[:int(numbers['raced'])]
+        begun = min((fit(one, int(numbers['race_steps'])) for one in nearest),
+                    key=lambda one: one.cost)
+        return fit(begun.z, steps)
     names = list(groups)
     options = [*kinds, *_shifted(base, free, first)]
     places = dict(zip(names, pool.map(lambda name: first if name == longest else fitted(
@@ -106,6 +110,8 @@ def fit_recordings(base: Base, drives: Sequence[Drive], begin: FloatArray,
     share(0.4)
     noise = _renewed(base, groups, places)
     wide = np.array([np.hypot(q.recording, q.change) for q in quantities])
+    # A delay of every stream is one of the commands: that of one stream is none in all recordings.
+    wide[base.reference] = base.sd[base.reference]
     for turn, until in enumerate((roughly, enough)):
         common = _mean(base, prior, wide, places, _quadratics(
             base, groups, noise, prior, places, pool))

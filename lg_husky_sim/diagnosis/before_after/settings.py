@@ -66,6 +66,8 @@ class Change:
         Names of those that differ.
     more : tuple of str
         Of those that differ as well, and show in the loop only.
+    aside : tuple of str
+        Of those that may differ as well, by how the recordings were made, and are not told.
     title, regime : str
         In words.
     elements : tuple of str
@@ -78,6 +80,7 @@ class Change:
     block: str
     parameters: tuple[str, ...]
     more: tuple[str, ...]
+    aside: tuple[str, ...]
     title: str
     regime: str
     elements: tuple[str, ...]
@@ -147,7 +150,7 @@ def _quantity(name: str, entry: Mapping[str, Any]) -> Quantity:
 
 
 def _change(entry: Mapping[str, Any], known: frozenset[str]) -> Change:
-    for name in (*entry['parameters'], *entry.get('more', ())):
+    for name in (*entry['parameters'], *entry.get('more', ()), *entry.get('aside', ())):
         if name not in known:
             raise DiagnosisError(f'before_after.yaml: change {entry["effect"]}: unknown parameter '
                                  f'{shown(name)}')
@@ -155,7 +158,8 @@ def _change(entry: Mapping[str, Any], known: frozenset[str]) -> Change:
         raise DiagnosisError(f'before_after.yaml: change {entry["effect"]}: block = '
                              f'{shown(entry["block"])} is neither body nor loop')
     return Change(entry['effect'], entry['side'], entry['subsystem'], entry['block'],
-                  tuple(entry['parameters']), tuple(entry.get('more', ())), entry['title'],
+                  tuple(entry['parameters']), tuple(entry.get('more', ())),
+                  tuple(entry.get('aside', ())), entry['title'],
                   entry['regime'], tuple(entry['elements']))
 
 

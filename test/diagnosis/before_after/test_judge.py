@@ -97,10 +97,29 @@ def test_all_other_ways_to_part_recordings_are_tried(names: str, later: str, cou
 
 
 def test_a_gain_is_rare_where_it_is_far_above_those_of_other_partitions() -> None:
-    rng = np.random.default_rng(4)
-    drawn = 20.0 * rng.exponential(size=(4000, 10))
-    chances = [exchange_chance(row[0], list(row[1:]), 1e-9) for row in drawn]
-    for rate in (0.02, 0.1):
-        assert np.mean(np.array(chances) < rate) == pytest.approx(rate, abs=0.01)
-    assert exchange_chance(-5.0, [1.0, 2.0], 1.0) == 1.0
-    assert exchange_chance(1000.0, [-3.0] * 9, 1.0) < 1e-15
+    """Robots whose gains by chance are of unlike scale are flagged at the stated rate."""
+    rng, numbers = np.random.default_rng(4), {'null_weight': 2.0, 'null_gain': 5.0}
+    for others in (9, 2, 0):
+        scale = 10.0 / rng.gamma(2.0, size=(20000, 1))
+        drawn = scale * rng.exponential(size=(20000, others + 1))
+        chances = [exchange_chance(row[0], list(row[1:]), numbers) for row in drawn]
+        for rate in (0.02, 0.1):
+            assert np.mean(np.array(chances) < rate) == pytest.approx(rate, abs=0.006)
+    assert exchange_chance(-5.0, [1.0, 2.0], numbers) == 1.0
+    assert exchange_chance(1000.0, [-3.0] * 9, numbers) < 1e-15
+
+
+def test_what_has_changed_is_not_taken_for_chance() -> None:
+    """
+    The other partitions mix recordings before and after a change.
+
+    A parameter that has no deviation from recording to recording then gains in all of them.
+    """
+    places = recorded(5)
+    for name in LATER:
+        places[name][body().names.index('track')] += 0.1
+    block = said(places)
+    before, after = (dict(zip(block.base.names, z, strict=True)) for z in (
+        block.before, block.after))
+    assert after['track'] - before['track'] == pytest.approx(0.1, rel=0.05)
+    assert block.chance < 1e-6
