@@ -69,7 +69,8 @@ class SetFit:
     z : numpy.ndarray, shape (n,)
         On the scale of the estimates.
     cost : float
-        Negative log posterior [nats], up to a constant of the noise.
+        Negative log posterior [nats], up to a constant of the noise; infinity where the
+        simulation breaks down at the start.
     """
 
     z: FloatArray
@@ -131,6 +132,8 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
         pairs = list(each(one, drives))
         errors, derivatives = [e for e, _ in pairs], [j for _, j in pairs]
         cost = _cost(errors, prior, z)
+        if not np.isfinite(cost):
+            break
         gram = np.diag(precision) + sum(j.T @ j for j in derivatives)
         begun = cost
         for _attempt in range(8):

@@ -22,6 +22,8 @@ CHANNELS = {'wheels': ('left', 'right'), 'imu': ('yaw', 'accel_x', 'accel_y'),
 #: Their kinds in ``config/before_after.yaml``.
 KINDS = {'left': 'wheels', 'right': 'wheels', 'yaw': 'yaw', 'accel_x': 'accel',
          'accel_y': 'accel', 'ahead': 'place', 'aside': 'place', 'turn': 'heading'}
+#: A prediction beyond this, in any unit, is that of a simulation which has broken down.
+_BROKEN = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +268,8 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
     mapping of str to numpy.ndarray
         Residual, shape (n_bins, n_channels).
     mapping of str to numpy.ndarray
-        Its derivatives, shape (n_bins, n_channels, n).
+        Its derivatives, shape (n_bins, n_channels, n); zero where the simulation breaks down a
+        step away.
     """
     x = base.values(z)
     inputs = driven(base, drive, x)
@@ -287,6 +290,7 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
         else:
             path = moved(base, drive, changed, inputs) if k < len(ROBOT) else motion
         other = predicted(base, drive, changed, path)
-        for name, rows in other.items():
-            columns[name][:, :, k] = (should[name] - rows) / delta
+        if all(np.all(np.abs(rows) < _BROKEN) for rows in other.values()):
+            for name, rows in other.items():
+                columns[name][:, :, k] = (should[name] - rows) / delta
     return {name: there[name] - should[name] for name in should}, columns

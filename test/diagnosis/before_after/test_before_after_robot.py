@@ -9,16 +9,17 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from lg_husky_sim.diagnosis.before_after import diagnose_change
+from lg_husky_sim.diagnosis.before_after import diagnose_change, prediction
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
 from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT, simulate
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
 from lg_husky_sim.diagnosis.before_after.conclusion import finding
 from lg_husky_sim.diagnosis.before_after.decision import decide
 from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, ChangeCase
-from lg_husky_sim.diagnosis.before_after.drives import drives, mean_command
+from lg_husky_sim.diagnosis.before_after.drives import Drive, drives, mean_command
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
-from lg_husky_sim.diagnosis.before_after.prediction import base_of
+from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
+from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of, Motion
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
 from lg_husky_sim.diagnosis.result import Verdict
@@ -300,3 +301,27 @@ def test_wrong_settings_are_refused_by_name(tmp_path: Path, monkeypatch: pytest.
             settings()
     finally:
         settings.cache_clear()
+
+
+def test_a_simulation_that_breaks_down_is_no_place_to_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a start there is no derivative then, and at a start no fit."""
+    known = settings()
+    base = base_of(known, load_model().parameters)
+    (drive,) = drives(driven('rec1', {}, 1, DRIVE[:3]), known.simulation['step'], known.bins,
+                      0.5, 3.0)
+    mass = base.names.index('mass')
+    free = np.arange(base.start.size) == mass
+    usual = prediction.predicted
+
+    def broken(base: Base, drive: Drive, x: FloatArray, motion: Motion) -> dict[str, FloatArray]:
+        found = usual(base, drive, x, motion)
+        return found if x[mass] == middle else {n: rows * np.inf for n, rows in found.items()}
+    middle = base.values(base.start)[mass]
+    monkeypatch.setattr(prediction, 'predicted', broken)
+    _, columns = prediction.jacobian(base, drive, base.start, free)
+    assert all(np.all(one == 0.0) for one in columns.values())
+    prior = Prior(base.start, base.sd, free)
+    middle = -1.0
+    fit = fit_set(base, [drive], prior, first_noise(known), base.start, 3, 1.0, map)
+    assert fit.cost == np.inf
+    assert np.array_equal(fit.z, base.start)
