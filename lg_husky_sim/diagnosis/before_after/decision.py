@@ -111,15 +111,16 @@ def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
     -------
     Decision
     """
-    numbers = settings.decision
+    blocks = [block for block in (body, loop) if block is not None]
+    # The accepted rate is that of all blocks looked at together (Bonferroni).
+    rate = settings.decision['false_alarm_rate'] / len(blocks)
+    numbers = {**settings.decision, 'false_alarm_rate': rate}
     bodily = () if body is None else body.candidates
     named = named_by(bodily, loop.candidates, numbers)
     everything = sorted((*bodily, *loop.candidates), key=lambda one: -one.gain)
-    blocks = [block for block in (body, loop) if block is not None]
     surest = min(blocks, key=lambda block: block.chance if block.anything > 0.0 else 1.0)
     gained = 0.0 if named is None else max(
         one.gain for one in (named, *loop.candidates) if one.change is named.change)
-    rate = numbers['false_alarm_rate']
     if surest.anything > 0.0 and surest.chance < rate and (
             gained < numbers['unknown_share'] * surest.anything):
         margin = 1.0 - gained / surest.anything
