@@ -92,8 +92,8 @@ def test_an_effort_too_small_to_count_is_not_missing(fitted: tuple[Evidence, Fit
     assert said(7.0) is Verdict.UNKNOWN
 
 
-def test_a_name_is_not_said_beside_a_larger_effort_without_one(fitted: tuple[Evidence, Fit]
-                                                                ) -> None:
+def test_a_name_is_not_said_beside_a_larger_effort_without_one(
+        fitted: tuple[Evidence, Fit]) -> None:
     """1226 nats for a name and 2965 for a smooth effort beside it are no answer."""
     evidence, fit = fitted
     slope = Hypothesis(Effect('slope'), ({'slope_x': 20.0, 'slope_y': 5.0},))

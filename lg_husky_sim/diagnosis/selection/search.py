@@ -18,8 +18,8 @@ from lg_husky_sim.diagnosis.selection.rounds import (
     attempt,
     calibrated,
     fitted,
+    forward_step,
     numbers_of,
-    play_round,
     Round,
     Tried,
     with_jitter,
@@ -214,8 +214,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     while len(rounds) < int(setting('most_effects')):
         number = len(rounds)
         progress(f'looking for effect {number + 1}', 0.1 + 0.25 * number)
-        one = play_round(evidence, base, hypotheses(base.point.structure),
-                         None if found else start, least, seeds)
+        one = forward_step(evidence, base, hypotheses(base.point.structure),
+                           None if found else start, least, seeds)
         seeds = []
         best = one.tried[0] if one.tried else None
         evidence = one.evidence

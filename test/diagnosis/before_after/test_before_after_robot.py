@@ -235,7 +235,7 @@ def test_a_change_without_a_name_is_unknown() -> None:
     block = Block(base, z, z, first_noise(known), (named,), 200.0, 1e-6)
     decision = decide(None, block, known)
     assert decision.named is None
-    assert decision.unnamed == 200.0
+    assert decision.unknown == 200.0
     found = finding(decision, known, 0.5)
     assert found is not None
     assert found.p_value == 1e-6
