@@ -221,11 +221,11 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
         notes.append('held-out errors that grow with the finding: '
                      + ', '.join(f'{name} {plain[name]:.3g} to {augmented[name]:.3g}'
                                  for name in worse))
-    most = setting('strained')
-    strained = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.strain,
-                                       strict=True) if abs(s) > most and u.kind == 'model']
-    if strained:
-        notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(strained)
+    most = setting('most_tolerances')
+    moved = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.prior_residuals,
+                                    strict=True) if abs(s) > most and u.kind == 'model']
+    if moved:
+        notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(moved)
                      + '; check that the model is one of this robot')
     periods = [d.clock.period for d in found.evidence.drives if d.clock is not None]
     if periods:

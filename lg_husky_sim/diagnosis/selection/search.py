@@ -108,7 +108,7 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, early: Sequence[Tried]) -> 
         The effect that is best at the nominal numbers, with numbers and noise of its own; none
         where the prior penalty of the recalibration is small.
     """
-    if 0.5 * float(np.sum(base.point.strain ** 2)) < setting('distorted'):
+    if 0.5 * float(np.sum(base.point.prior_residuals ** 2)) < setting('distorted'):
         return []
     names = [u.name for u in base.point.unknowns]
     if early and names == [u.name for u in rough.point.unknowns]:
