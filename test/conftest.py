@@ -1,11 +1,17 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Robots with effects for every folder of tests, and the mark of those that look at the clock."""
+"""Robots with effects and a browser for every folder; the mark of tests that look at the clock."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+import html
+import json
 from pathlib import Path
+import re
+import shutil
+import subprocess
+from typing import Any
 
 from lg_husky_sim.husky.effects import Effect, Onset
 from lg_husky_sim.husky.model import compile_model, Structure
@@ -62,3 +68,89 @@ def _robot(*effects: str | Effect, onset: Onset | None = None, **values: float) 
 def robot() -> Callable[..., Plant]:
     """Return a function that makes the paper's Husky with effects and other numbers."""
     return _robot
+
+
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
+VISIT = """
+addEventListener('load', async () => {
+  const wait = (time) => new Promise((done) => setTimeout(done, time));
+  const $ = (name) => document.getElementById(name), seen = {};
+  const all = (name) => [...document.querySelectorAll(`[data-${name}]`)];
+  const drawn = (place) => ($(place) && $(place).data ? $(place).data.length : 0);
+  const range = () => $('plot-signals').layout.xaxis.range.map(Number);
+  const title = () => [...$('plot-signals').layout.annotations].map((one) => one.text)[0];
+  for (let k = 0; k < 100 && !$('plot-signals')?.data; k += 1) await wait(100);
+  seen.alive = document.body.classList.contains('alive');
+  seen.size = [document.documentElement.scrollWidth, innerWidth];
+  seen.dark = getComputedStyle(document.body).backgroundColor;
+  seen.drawn = ['plot-first', 'plot-signals', 'plot-path'].map(drawn);
+  seen.recordings = [...$('recording').options].map((one) => one.text);
+  seen.range = range();
+  const press = async (button) => { button.click(); await wait(200); };
+  for (const way of ['in', 'on', 'back', 'out', 'all']) {
+    await press(all('zoom').find((one) => one.dataset.zoom === way));
+    seen[way] = range();
+  }
+  await press(all('show').find((one) => one.dataset.show === 'errors'));
+  seen.errors = [drawn('plot-signals'), title()];
+  seen.signs = $('plot-signals').data.filter((one) => one.name).slice(0, 3).map(
+    (one) => Math.sign(one.y[10]));
+  await press(all('show').find((one) => one.dataset.show === 'values'));
+  seen.values = [drawn('plot-signals'), title()];
+  seen.coloured = [];
+  for (const column of all('column')) {
+    await press(column);
+    const path = $('plot-path').data.find((one) => one.name === 'measured');
+    seen.coloured.push(path.marker.color.length > 1
+      ? Array.from(path.marker.color).filter(Number.isFinite).reduce((a, b) => a + b, 0) : null);
+  }
+  $('recording').selectedIndex = $('recording').options.length - 1;
+  $('recording').dispatchEvent(new Event('change'));
+  await wait(200);
+  seen.chosen = range();
+  if ($('plot-path')) {
+    $('plot-path').emit('plotly_click', { points: [{ customdata: 6 }] });
+    await wait(200);
+    seen.clicked = range();
+  }
+  seen.jumps = [];
+  for (const jump of all('jump')) {
+    await press(jump);
+    seen.jumps.push([$('recording').selectedOptions[0].text, ...range()]);
+  }
+  for (const one of document.querySelectorAll('details')) one.open = true;
+  await wait(300);
+  seen.charts = all('chart').map((one) => (one.data ? one.data.length : 0));
+  document.body.dataset.seen = JSON.stringify(seen);
+});
+"""
+"""What a reader does with a report, written down in the page itself."""
+
+
+@pytest.fixture(scope='session')
+def visited(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Any]]:
+    """Return a function that opens a report in a browser, uses every button and says what came."""
+    pytest.importorskip('plotly')
+    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if browser is None:
+        pytest.skip(f'NO BROWSER ({", ".join(BROWSERS)}): the JavaScript of reports is not tested')
+
+    def visit(page: Path, width: int = 1280, dark: bool = False) -> dict[str, Any]:
+        folder = tmp_path_factory.mktemp('browser')
+        text = page.read_text(encoding='utf-8')
+        script = f'<script>{VISIT}</script></body>'
+        (folder / 'page.html').write_text(text.replace('</body>', script), encoding='utf-8')
+        ran = subprocess.run([
+            browser, '--headless=new', '--no-sandbox', '--disable-gpu', '--hide-scrollbars',
+            f'--user-data-dir={folder / "profile"}', f'--window-size={width},900',
+            f'--blink-settings=preferredColorScheme={0 if dark else 1}',
+            '--enable-logging=stderr', '--log-level=0', '--virtual-time-budget=60000',
+            '--dump-dom', (folder / 'page.html').as_uri()],
+            capture_output=True, text=True, timeout=600, check=True)
+        said = re.findall(r'CONSOLE[^\]]*\] (.*)', ran.stderr)
+        assert not said, f'in the console of {page.name}: {said}'
+        answer = re.search(r'data-seen="([^"]*)"', ran.stdout)
+        assert answer is not None, f'{page.name} did not come to life'
+        seen: dict[str, Any] = json.loads(html.unescape(answer.group(1)))
+        return seen
+    return visit

@@ -10,8 +10,9 @@ import math
 
 from lg_husky_sim.diagnosis.decision import confidence
 from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
 from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import neutral_of
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, Effort
 from lg_husky_sim.diagnosis.localisation import Missing, where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
@@ -20,6 +21,7 @@ from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import sentence
+from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import descriptions, Effect
 from lg_husky_sim.husky.network import on_side
 from lg_husky_sim.husky.parameters import Parameters
@@ -45,21 +47,75 @@ def estimates(fit: Fit, names: Sequence[str], units: Parameters) -> tuple[Estima
     Returns
     -------
     tuple of Estimate
-        Intervals from the curvature of the cost, priors included, inside the bounds.
+        Intervals from the curvature of the cost, priors included, inside the bounds; without the
+        numbers that are not determined: their intervals are the bounds of the search.
     """
+    return tuple(
+        _estimate(unknown, place, half, units.entry(unknown.name).unit)
+        for unknown, place, half in _intervals(fit)
+        if unknown.name in names and not _is_undetermined(unknown, place, half))
+
+
+def undetermined(fit: Fit, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the fitted numbers whose intervals are the bounds of their search."""
+    return tuple(unknown.name for unknown, place, half in _intervals(fit)
+                 if unknown.name in names and _is_undetermined(unknown, place, half))
+
+
+def _is_undetermined(unknown: Unknown, place: float, half: float) -> bool:
+    return place - half <= unknown.lower and place + half >= unknown.upper
+
+
+def _intervals(fit: Fit) -> list[tuple[Unknown, float, float]]:
+    # Each number of the robot or an effect with its place and half of its 95 % interval there.
     nu = setting('student')
     weight = (nu + 1.0) / (nu + fit.whitened ** 2)
     normal = (fit.jacobian * weight[:, None]).T @ fit.jacobian + np.diag(
         fit.point.weights ** 2)
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
     covariance = np.linalg.pinv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
-    found = []
-    for place, unknown in enumerate(fit.point.unknowns):
-        if unknown.name in names and unknown.kind != 'log':
-            found.append(_estimate(unknown, float(fit.point.places[place]),
-                                   1.96 * float(np.sqrt(max(covariance[place, place], 0.0))),
-                                   units.entry(unknown.name).unit))
-    return tuple(found)
+    # A number that moves no reading has no information, of which a pseudo-inverse makes certainty.
+    half = np.where(np.diag(normal) > 1e-12,
+                    1.96 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), math.inf)
+    return [(unknown, place, wide) for unknown, place, wide in zip(
+        fit.point.unknowns, fit.point.places.tolist(), half.tolist(), strict=True)
+        if unknown.kind != 'log']
+
+
+def without_undetermined(evidence: Evidence, fit: Fit) -> Point:
+    """
+    Return a fitted point with the numbers that are not determined where they do nothing.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    fit : Fit
+
+    Returns
+    -------
+    Point
+        Numbers of the robot are nominal there. One that cannot be so, because the data are
+        explained worse then than at the end of a 95 % interval, stays as it was fitted.
+    """
+    point = fit.point
+    idle = {p.name: neutral_of(p) for e in point.structure.effects for p in e.parameters()}
+    most = evidence.cost(evidence.residuals(fit.predicted), point) + 0.5 * 1.96 ** 2
+    for name in undetermined(fit, list(point.numbers)):
+        place = next(k for k, u in enumerate(point.unknowns) if u.name == name)
+        unknown, value = point.unknowns[place], idle.get(name)
+        places = np.array(point.places)
+        if unknown.kind == 'model':
+            places[place] = unknown.centre
+        elif value is not None:
+            places[place] = unknown.place(value)
+        try:
+            moved = point.at(places)
+            cost = evidence.cost(evidence.residuals(evidence.predict(moved)), moved)
+        except LgHuskyError:
+            continue
+        if cost <= most:
+            point = moved
+    return point
 
 
 def _estimate(unknown: Unknown, place: float, half: float, unit: str) -> Estimate:
@@ -136,8 +192,8 @@ def findings(search: Search) -> tuple[Finding, ...]:
         effect = next(e for e in search.final.point.structure.effects
                       if (e.id, e.side) == (best.hypothesis.effect.id,
                                             best.hypothesis.effect.side))
-        numbers = estimates(search.final, [p.name for p in best.hypothesis.free],
-                            search.final.point.numbers)
+        names = [p.name for p in best.hypothesis.free]
+        numbers = estimates(search.final, names, search.final.point.numbers)
         onset = search.final.point.structure.onset if effect.late else None
         regime = where_it_shows(one.evidence, _gains(one.base, best.fit))
         side = _acting_side(effect, numbers)
@@ -145,7 +201,8 @@ def findings(search: Search) -> tuple[Finding, ...]:
             effect.id, side, effect.kind.subsystem.value,
             on_side(effect.kind.elements, side), regime, onset, numbers, best.gain, one.chance,
             min(1.0, best.gain / total), rivals_of(one),
-            sentence(effect, onset, numbers, regime)))
+            sentence(effect, onset, numbers, regime,
+                     undetermined=undetermined(search.final, names))))
     return tuple(sorted(found, key=lambda f: -f.held_out_gain))
 
 

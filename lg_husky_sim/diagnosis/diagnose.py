@@ -15,7 +15,9 @@ from lg_husky_sim.diagnosis.conclusion import (
     findings,
     indistinguishable,
     remaining,
+    undetermined,
     unknown_finding,
+    without_undetermined,
 )
 from lg_husky_sim.diagnosis.decision.confidence import Features
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
@@ -167,16 +169,19 @@ def _diagnosis(found: Search, left: Search, rest: Sequence[Effort], free: Sequen
         estimates(found.final, list(nominal.parameters), nominal.parameters),
         errors(found.plain.point.plant, parts), errors(found.final.point.plant, parts),
         plain_out, augmented_out, _remaining(found, rest),
-        _model(found.final, found.evidence, nominal, about),
-        _model(found.plain, found.evidence, nominal, 'recalibrated, nothing added'),
+        model_of(found.final, found.evidence, nominal, about),
+        model_of(found.plain, found.evidence, nominal, 'recalibrated, nothing added'),
         _notes(found, plain_out, augmented_out), asdict(said.features))
     return diagnosis, said.features
 
 
-def _model(fit: Fit, evidence: Evidence, nominal: ModelFile, about: str) -> ModelFile:
-    numbers = fit.point.numbers
-    entries: list[Parameter] = []
-    for one in estimates(fit, list(numbers), numbers):
+def model_of(fit: Fit, evidence: Evidence, nominal: ModelFile, about: str) -> ModelFile:
+    """Return a fit as a model that can be written: numbers with intervals and sources."""
+    numbers = without_undetermined(evidence, fit).numbers
+    entries: list[Parameter] = [
+        replace(numbers.entry(name), source='not determined by these recordings')
+        for name in undetermined(fit, list(numbers))]
+    for one in estimates(fit, list(numbers), fit.point.numbers):
         entry = numbers.entry(one.name)
         source = entry.source if one.name not in nominal.parameters else (
             'recalibrated by lg_husky diagnose; nominal '
@@ -216,11 +221,11 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
         notes.append('held-out errors that grow with the finding: '
                      + ', '.join(f'{name} {plain[name]:.3g} to {augmented[name]:.3g}'
                                  for name in worse))
-    most = setting('strained')
-    strained = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.strain,
-                                       strict=True) if abs(s) > most and u.kind == 'model']
-    if strained:
-        notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(strained)
+    most = setting('most_tolerances')
+    moved = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.prior_residuals,
+                                    strict=True) if abs(s) > most and u.kind == 'model']
+    if moved:
+        notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(moved)
                      + '; check that the model is one of this robot')
     periods = [d.clock.period for d in found.evidence.drives if d.clock is not None]
     if periods:

@@ -11,7 +11,7 @@ from lg_husky_sim.diagnosis.before_after.diagnose_change import ChangeCase
 from lg_husky_sim.diagnosis.before_after.report import change_report
 from lg_husky_sim.diagnosis.diagnose import Case
 from lg_husky_sim.diagnosis.report import headline as page_headline
-from lg_husky_sim.diagnosis.report import unnamed
+from lg_husky_sim.diagnosis.report import unexplained_sensors
 from lg_husky_sim.diagnosis.report_of_case import case_report
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Verdict
 from lg_husky_sim.husky.model_file import save_model
@@ -82,7 +82,8 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
     lines += _error_lines(diagnosis)
     if diagnosis.fits:
         lines.append(f'  remaining: {diagnosis.remaining}')
-    lines.extend(f'  sensors against each other: {text}' for text in unnamed(diagnosis))
+    lines.extend(f'  sensors against each other: {text}'
+                 for text in unexplained_sensors(diagnosis))
     lines.extend(f'  note: {note}' for note in diagnosis.notes)
     return '\n'.join(lines)
 

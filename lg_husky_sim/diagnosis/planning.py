@@ -251,7 +251,7 @@ def imitated(truth: Rival, other: Rival, manoeuvre: Manoeuvre) -> tuple[float, s
                 fit = evidence.fit(point, rounds=int(setting('planned_rounds')))
             except LgHuskyError:
                 continue
-            nats = 0.5 * float(np.sum(fit.whitened ** 2) + np.sum(fit.point.strain ** 2))
+            nats = 0.5 * float(np.sum(fit.whitened ** 2) + np.sum(fit.point.prior_residuals ** 2))
             if best is None or nats < best[0]:
                 channels = drive.channels[evidence.whiteners[0].frame.order]
                 best = (nats, fit.whitened ** 2, channels)

@@ -256,7 +256,7 @@ def competing(diagnosis: Diagnosis) -> tuple[Section, ...]:
     return (Section('Competing effects', tuple(text), tables=tuple(tables)),) if tables else ()
 
 
-def unnamed(diagnosis: Diagnosis) -> tuple[str, ...]:
+def unexplained_sensors(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return what sensors say of each other that no finding says already."""
     return tuple(text for text in diagnosis.sensors
                  if not any(one.statement.startswith(text) for one in diagnosis.findings))
@@ -332,7 +332,7 @@ def report_data(
              if not diagnosis.fits else
              'refitted with a smooth description of what is missing'}
     remains = diagnosis.remaining if diagnosis.fits else ''
-    notes = (*(f'sensors against each other: {text}' for text in unnamed(diagnosis)),
+    notes = (*(f'sensors against each other: {text}' for text in unexplained_sensors(diagnosis)),
              *diagnosis.notes,
              *((f'what remains: {remains}',) if remains else ()))
     warnings = (*losses(errors), *(implausible(parameters) if diagnosis.fits else ()))

@@ -83,9 +83,13 @@ def effect_words(effect: Effect) -> str:
 
 
 def sentence(effect: Effect, onset: Onset | None, numbers: Sequence[Estimate], regime: str,
-             changed: bool = False) -> str:
-    """Return a finding in one plain sentence with numbers."""
+             changed: bool = False, undetermined: Sequence[str] = ()) -> str:
+    """Return a finding in plain sentences with numbers, and with those that are not known."""
     mainly = '' if regime.startswith('everywhere') else 'mainly '
+    words = f': {in_words(numbers)}' if numbers else ''
     text = (f'{"changed: " if changed else ""}{effect_words(effect)}'
-            f'{onset_words(onset)}: {in_words(numbers)}. It shows {mainly}{regime}.')
+            f'{onset_words(onset)}{words}. It shows {mainly}{regime}.')
+    if undetermined:
+        names = ' and '.join(name.replace('_', ' ') for name in undetermined)
+        text += f' These recordings do not determine {names}.'
     return text[0].upper() + text[1:]

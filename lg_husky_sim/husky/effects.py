@@ -333,7 +333,7 @@ def always_on() -> list[str]:
 
 @cache
 def descriptions() -> Mapping[str, EffectKind]:
-    """Return the smooth efforts of ``config/effects.yaml``, which describe unnamed physics."""
+    """Return the smooth efforts of ``config/effects.yaml``, which describe unknown effects."""
     data = read_yaml(config_path('effects.yaml'), ModelFileError)
     return {name: _read_kind(name, entry) for name, entry in data['descriptions'].items()}
 

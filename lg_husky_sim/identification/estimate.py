@@ -14,7 +14,7 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.confidence import Confidence, confidence, undetermined
 from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
-from lg_husky_sim.identification.multistart import best_solution, Ends, lingers, refine
+from lg_husky_sim.identification.multistart import best_solution, Ends, is_autocorrelated, refine
 from lg_husky_sim.identification.problem import Observations, observations, UNITS
 from lg_husky_sim.identification.profile import Profile, profile
 from lg_husky_sim.identification.result import (
@@ -262,7 +262,7 @@ def _warnings(solution: Solution, estimates: Sequence[Estimated], sure: Confiden
 def _left_over(problem: Problem, solution: Solution) -> list[str]:
     data = problem.observations
     scaled = (data.measured - solution.predicted) * problem.metric.scale
-    names = [name for name in data.channels if lingers(data, scaled, name)]
+    names = [name for name in data.channels if is_autocorrelated(data, scaled, name)]
     return [f'autocorrelated residuals ({", ".join(map(quantity, names))}): physics is missing '
             'from the model, and the intervals hold only for this model; lg_husky diagnose finds '
             'out what is missing'] if names else []

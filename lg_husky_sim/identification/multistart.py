@@ -174,12 +174,12 @@ def noise_metric(data: Observations, residual: FloatArray, predicted: FloatArray
     scale = scale * np.sqrt(weight)
     plain = metric(data, residual, scale, order=0)
     white = metric(data, residual, scale)
-    filters = {name: plain.filters[name] if lingers(data, residual * scale, name)
+    filters = {name: plain.filters[name] if is_autocorrelated(data, residual * scale, name)
                else white.filters[name] for name in data.channels}
     return Metric(scale, filters)
 
 
-def lingers(data: Observations, scaled: FloatArray, name: str) -> bool:
+def is_autocorrelated(data: Observations, scaled: FloatArray, name: str) -> bool:
     """
     Return whether a channel's residual stays on one side longer than noise does.
 

@@ -89,7 +89,7 @@ class Piece:
         Whether each number of :attr:`began` was measured at the start.
     turned : TimeSeries or None
         Measured wheel angles, for the resets.
-    momentary : bool
+    sampled : bool
         Whether the wheel rates are those of the moment, not means over the time in which an
         encoder counts.
     """
@@ -106,7 +106,7 @@ class Piece:
     wheel_angles: tuple[float, float]
     told: tuple[bool, bool, bool, bool] = (True, True, True, True)
     turned: TimeSeries | None = None
-    momentary: bool = False
+    sampled: bool = False
 
     @property
     def name(self) -> str:

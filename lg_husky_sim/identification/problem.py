@@ -253,7 +253,7 @@ def _seen(channel: Channel, piece: Piece, grid: FloatArray, angle: FloatArray,
         late = sensors.delay_wheels + extra.get('delay_wheels', 0.0)
         factor = sensors.encoder_left if name == 'wheel_left' else sensors.encoder_right
         ends = channel.times - late
-        if piece.momentary:
+        if piece.sampled:
             return factor * sample(grid[:, _COLUMN[name]], start, ends)
         angles = grid[:, _COLUMN[name.replace('wheel', 'angle')]]
         return factor * (sample(angles, start, ends) - sample(

@@ -94,15 +94,15 @@ def _gapped(values: FloatArray, step: int) -> FloatArray:
     return found
 
 
-def longest_stretch(times: FloatArray, misfit: FloatArray, length: float) -> tuple[float, float]:
+def longest_stretch(times: FloatArray, error: FloatArray, length: float) -> tuple[float, float]:
     """
-    Return the stretch of a signal in which a misfit is largest.
+    Return the stretch of a signal in which an error is largest.
 
     Parameters
     ----------
     times : numpy.ndarray, shape (n,)
         [s].
-    misfit : numpy.ndarray, shape (n,)
+    error : numpy.ndarray, shape (n,)
         At each time; what is not a number counts nothing.
     length : float
         Of the stretch [s].
@@ -115,7 +115,7 @@ def longest_stretch(times: FloatArray, misfit: FloatArray, length: float) -> tup
     known = times[np.isfinite(times)]
     if not known.size or known[-1] - known[0] <= length:
         return (float(known[0]), float(known[-1])) if known.size else (0.0, 1.0)
-    total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(misfit))])
+    total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(error))])
     last = np.searchsorted(times, times + length, side='right')
     first = int(np.argmax(total[last] - total[:times.size]))
     start = min(float(times[first]), float(known[-1]) - length)

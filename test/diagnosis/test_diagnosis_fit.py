@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.evidence.noise import first_guess, sensor_variance
 from lg_husky_sim.diagnosis.evidence.observation import APART, Reading, simulate
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
-from lg_husky_sim.diagnosis.selection.rounds import calibrated, play_round
+from lg_husky_sim.diagnosis.selection.rounds import calibrated, forward_step
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
@@ -75,7 +75,7 @@ def test_an_effect_gets_the_form_that_does_best(
     with ThreadPoolExecutor(1) as threads:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), threads)
         evidence, base = calibrated(evidence, start, 1)
-        best = play_round(evidence, base, pool, start).tried[0]
+        best = forward_step(evidence, base, pool, start).tried[0]
     assert best.hypothesis.effect == effect
     for name, value in sizes.items():
         assert best.fit.point.values[name] == pytest.approx(value, rel=0.25), name

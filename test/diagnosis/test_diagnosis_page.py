@@ -8,8 +8,8 @@ from dataclasses import replace
 import math
 
 from lg_husky_sim.diagnosis.before_after.settings import settings
-from lg_husky_sim.diagnosis.report import advice, headline, implausible, losses
-from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
+from lg_husky_sim.diagnosis.report import advice, competing, headline, implausible, losses
+from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Rivalry, Verdict
 from lg_husky_sim.diagnosis.wording import sentence, sized
 from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.model_file import load_model
@@ -21,7 +21,7 @@ from lg_husky_sim.reporting.data import (
     RECALIBRATED,
     WITH_FINDING,
 )
-from lg_husky_sim.reporting.sections import Tone
+from lg_husky_sim.reporting.sections import Cell, Tone
 import pytest
 
 
@@ -132,6 +132,42 @@ def test_a_limit_on_the_speed_says_nothing_of_the_yaw_rate() -> None:
     _, simulator = advice(_diagnosis(Verdict.KNOWN, limit), {})
     assert simulator.sentences[0] == 'Set `max_forward: 0.45` [m/s] in sim_node.'
     assert not any('max_yaw' in line for line in simulator.sentences)
+
+
+@pytest.mark.parametrize(('effect', 'shape', 'number', 'robot', 'simulator'), [
+    ('command_slew', 'forward', Estimate('slew_forward', 1.8, 'm/s²', 1.7, 1.9),
+     '`linear.x.max_acceleration` of diff_drive_controller: it acts like 1.8 m/s²',
+     '`max_forward_acceleration: 1.8`'),
+    ('command_limit', 'yaw', Estimate('limit_yaw', 0.99, 'rad/s', 0.98, 1.0),
+     '`angular.z.max_velocity` of diff_drive_controller', '`max_yaw: 0.99`'),
+    ('sensor_time_offset', 'imu', Estimate('stamp_delay', 0.2, 's', 0.19, 0.21),
+     'of the IMU are 0.2 s late', 'sim_node'),
+    ('torque_ripple', '', Estimate('ripple_cos', 3.0, 'N·m', 2.8, 3.2), 'the left wheels',
+     'sim_node')])
+def test_the_user_is_told_which_setting_to_change(effect: str, shape: str, number: Estimate,
+                                                  robot: str, simulator: str) -> None:
+    side = 'left' if effect == 'torque_ripple' else 'none'
+    numbers = RIPPLE.parameters if effect == 'torque_ripple' else (number,)
+    said = {one.where: ' '.join(one.sentences) for one in advice(
+        _diagnosis(Verdict.KNOWN, _finding(effect, side, *numbers)), {(effect, side): shape})}
+    assert robot in said['On the robot']
+    assert simulator in said['In the simulator']
+
+
+@pytest.mark.parametrize(('gain', 'words'), [(31740.0, '100 % of its gain'),
+                                             (400.0, '1 % of its gain'), (0.0, '')])
+def test_the_runner_up_is_said_as_near_as_its_bar_is_long(gain: float, words: str) -> None:
+    finding = replace(_finding('command_limit', 'none'), held_out_gain=31740.0,
+                      rivals=(Rivalry('payload', 'none', gain),))
+    (section,) = competing(_diagnosis(Verdict.KNOWN, finding))
+    first, other = (row[1] for row in section.tables[0].rows)
+    assert isinstance(first, Cell)
+    assert isinstance(other, Cell)
+    assert first.bar == 1.0
+    assert other.bar == pytest.approx(gain / 31740.0)
+    runner_up = [line for line in section.text if line.startswith('Runner-up')]
+    assert len(runner_up) == bool(words)
+    assert all(words in line for line in runner_up)
 
 
 def test_what_gets_worse_on_held_out_data_is_said_first() -> None:

@@ -79,7 +79,7 @@ def _least_squares(fit: Fit, columns: FloatArray) -> tuple[FloatArray, FloatArra
     root = np.sqrt((nu + 1.0) / (nu + fit.whitened ** 2))[:, None]
     base = np.vstack([root * fit.jacobian, np.diag(fit.point.weights)])
     padded = np.vstack([root * columns, np.zeros((base.shape[1], columns.shape[1]))])
-    target = np.concatenate([root[:, 0] * fit.whitened, -fit.point.strain])
+    target = np.concatenate([root[:, 0] * fit.whitened, -fit.point.prior_residuals])
     left = padded - base @ np.linalg.lstsq(base, padded, rcond=None)[0]
     return left.T @ left, left.T @ target
 

@@ -41,10 +41,10 @@ def test_a_speed_loop_is_a_seed_where_the_numbers_of_the_robot_took_its_place(
     plant = compile_model(model.structure.with_effect(loop)).at(
         model.parameters.with_entries(*entries_of(loop, sizes)))
     base, seeds = _seeded(record('loop', plant, steps, 1))
-    assert max(abs(base.point.strain)) > 5.0
+    assert max(abs(base.point.prior_residuals)) > 5.0
     assert [one.hypothesis.effect.id for one in seeds] == ['speed_loop']
     assert seeds[0].gain > 100.0
-    assert max(abs(seeds[0].fit.point.strain)) < max(abs(base.point.strain))
+    assert max(abs(seeds[0].fit.point.prior_residuals)) < max(abs(base.point.prior_residuals))
 
 
 def test_a_robot_within_its_tolerances_has_no_seeds(record: Recorded, steps: Steps) -> None:

@@ -16,13 +16,15 @@ from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.bursts import burst_evidence, levelled
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import beyond_chance, Effort
 from lg_husky_sim.diagnosis.localisation import steady_knots
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.diagnosis.selection.rounds import Round
+from lg_husky_sim.diagnosis.selection.rounds import Round, Tried
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import FloatArray
@@ -88,6 +90,25 @@ def test_an_effort_too_small_to_count_is_not_missing(fitted: tuple[Evidence, Fit
         return answer(search, [effort], []).verdict
     assert said(0.37) is Verdict.NOTHING_MISSING
     assert said(7.0) is Verdict.UNKNOWN
+
+
+def test_a_name_is_not_said_beside_a_larger_effort_without_one(
+        fitted: tuple[Evidence, Fit]) -> None:
+    """1226 nats for a name and 2965 for a smooth effort beside it are no answer."""
+    evidence, fit = fitted
+    slope = Hypothesis(Effect('slope'), ({'slope_x': 20.0, 'slope_y': 5.0},))
+    slopes = evidence.fit(slope.point(fit.point, slope.starts[0]), rounds=1)
+    tried = Tried(slope, slopes, 1226.0, evidence.count)
+    search = Search(fit, fit, evidence, (Round(evidence, fit, (tried,), True, 1e-9),), (slope,))
+
+    def said(explained: float) -> tuple[Verdict, float]:
+        effort = Effort('moment', 'yaw', explained, explained, 0.0, 1.0, np.linspace(-9.0, 9.0, 9),
+                        np.full(9, 0.01))
+        found = answer(search, [effort], [])
+        return found.verdict, found.sure
+    assert said(2965.0)[0] is Verdict.UNKNOWN
+    assert said(60.0)[0] is said(300.0)[0] is Verdict.KNOWN
+    assert said(300.0)[1] < said(60.0)[1]  # and less surely, the more it explains
 
 
 def test_bursts_are_looked_for_where_the_drive_is_steady(fitted: tuple[Evidence, Fit]) -> None:

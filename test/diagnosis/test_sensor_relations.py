@@ -152,10 +152,10 @@ def test_a_payload_of_hundreds_of_kilograms_is_another_robot(name: str, value: f
     entry = model.parameters.entry('mass')
     unknowns = (model_unknown(entry), *effect_unknowns(payload, {
         p.name: numbers[p.name] for p in payload.parameters()}))
-    strain = np.array([np.log(numbers['mass'] / entry.value) / entry.tolerance] + [0.0] * (
+    residuals = np.array([np.log(numbers['mass'] / entry.value) / entry.tolerance] + [0.0] * (
         len(unknowns) - 1))
     fit: Any = SimpleNamespace(point=SimpleNamespace(
-        unknowns=unknowns, strain=strain, numbers=numbers))
+        unknowns=unknowns, prior_residuals=residuals, numbers=numbers))
     assert bool(impossible(fit, model.parameters)) is impossible_
 
 

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import json
 from pathlib import Path
+from typing import Any
 
 from lg_husky_sim.cli.main import run
 from lg_husky_sim.errors import CommandError, SettingsError
@@ -61,6 +63,20 @@ def test_held_out_errors_are_of_the_papers_size_or_better(evaluated: Path) -> No
     ratio = values['yaw_damping']['value'] / values['wheel_damping']['value']
     assert ratio == pytest.approx(truth['yaw_damping'] / truth['wheel_damping'], rel=0.02)
     assert values['command_gain']['value'] == pytest.approx(truth['command_gain'], rel=0.005)
+
+
+def test_the_page_works_in_a_browser(visited: Callable[..., dict[str, Any]], evaluated: Path
+                                     ) -> None:
+    seen = visited(evaluated / 'index.html')
+    (case,) = json.loads((evaluated / 'evaluation.json').read_text())['cases']
+    assert seen['alive']
+    assert [name.split(': ')[-1] for name in seen['recordings']] == list(MANOEUVRES)
+    assert min(seen['drawn'][1:]) > len(case['fits'])
+    assert seen['values'] != seen['errors']
+    low, high = seen['range']
+    assert seen['in'] == pytest.approx([low + (high - low) / 4, high - (high - low) / 4])
+    assert seen['clicked'] == pytest.approx([1.0, 11.0])
+    assert len(set(seen['coloured'])) == len(seen['coloured']) > len(case['fits'])
 
 
 def test_recordings_are_evaluated_with_a_rival(tmp_path: Path, evaluated: Path,

@@ -29,6 +29,18 @@ def test_the_paper_s_graph_is_derived_step_by_step(capsys: pytest.CaptureFixture
         assert line in shown.splitlines(), line
 
 
+def test_a_and_b_are_printed_in_numbers(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(['derive']) == 0
+    lines = capsys.readouterr().out.splitlines()
+    space = load_model()
+    expected = compile_model(space.structure).at(space.parameters).sets[-1]
+    for name, matrix in (('A', expected.a), ('B', expected.b)):
+        first = len(lines) - lines[::-1].index(f'{name} =')  # the symbolic one stands before
+        shown = [[float(part) for part in line.split()]
+                 for line in lines[first:first + matrix.shape[0]]]
+        np.testing.assert_allclose(shown, matrix, rtol=1e-5)
+
+
 def test_parameters_instead_of_elements(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(['derive', '--model', 'expanded', '--parameters', '--output', 'tau(K_BeltL)']) == 0
     shown = capsys.readouterr().out

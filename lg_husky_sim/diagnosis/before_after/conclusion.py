@@ -64,11 +64,11 @@ def finding(decision: Decision, settings: Settings, share: float) -> Finding | N
     named = decision.named
     rivals = tuple(Rivalry(one.change.effect, one.change.side, one.gain)
                    for one in decision.rivals)
-    if decision.unnamed:
+    if decision.unknown:
         near = decision.rivals[0].change if decision.rivals else None
         return Finding('unknown', 'none', near.subsystem if near else 'drivetrain',
                        near.elements if near else (), near.regime if near else '', None, (),
-                       decision.unnamed, decision.chance, share, rivals,
+                       decision.unknown, decision.chance, share, rivals,
                        'Something has changed that is none of the known changes: the later '
                        'recordings need other parameters than the earlier ones.')
     if named is None:

@@ -28,7 +28,7 @@ class Decision:
     tied : tuple of str
         Names that cannot be told from the one given, itself first; empty where it stands alone.
     confidence : float
-    unnamed : float
+    unknown : float
         Gain of letting everything differ where something changed that has no name [nats]; else 0.
     chance : float
         Of what is claimed, on a robot that has not changed; NaN where nothing changed.
@@ -38,7 +38,7 @@ class Decision:
     rivals: tuple[Candidate, ...]
     tied: tuple[str, ...]
     confidence: float
-    unnamed: float = 0.0
+    unknown: float = 0.0
     chance: float = float('nan')
 
 

@@ -154,7 +154,7 @@ def _diagnosis(decision: Decision, body: Block | None, loop: Block, after: Seque
     shown = body if named is not None and named.change.block == 'body' and body else loop
     return Diagnosis(
         Verdict.NOTHING_MISSING if found is None else (
-            Verdict.UNKNOWN if decision.unnamed else Verdict.KNOWN), decision.confidence,
+            Verdict.UNKNOWN if decision.unknown else Verdict.KNOWN), decision.confidence,
         () if found is None else (found,), not_told_apart(decision, known),
         mismatches(shown, after, decision, known), (),
         _errors(plain, later), _errors(model, later), _errors(plain, test), _errors(half, test),

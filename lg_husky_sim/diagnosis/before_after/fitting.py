@@ -55,8 +55,8 @@ class Prior:
 
     def cost(self, z: FloatArray) -> float:
         """Return its part of the negative log posterior."""
-        strain = (z - self.mean)[self.free] / self.sd[self.free]
-        return 0.5 * float(strain @ strain)
+        deviation = (z - self.mean)[self.free] / self.sd[self.free]
+        return 0.5 * float(deviation @ deviation)
 
 
 @dataclass(frozen=True, eq=False)

@@ -98,7 +98,7 @@ class Point:
         return self.reading.replacing(values_of(self.unknowns, self.places, 'log'))
 
     @cached_property
-    def strain(self) -> FloatArray:
+    def prior_residuals(self) -> FloatArray:
         """Distances of the unknowns from the centres of their priors, in deviations."""
         centre = np.array([u.centre for u in self.unknowns])
         found: FloatArray = (self.places - centre) * self.weights
@@ -207,7 +207,7 @@ class Evidence:
         """Return the negative log posterior of a point, up to a constant [nats]."""
         nu = setting('student')
         return float(np.sum(0.5 * (nu + 1.0) * np.log1p(whitened * whitened / nu))
-                     + 0.5 * np.sum(point.strain ** 2))
+                     + 0.5 * np.sum(point.prior_residuals ** 2))
 
     def surprise(self, fit: Fit) -> float:
         """Return the cost of a fit under this noise, comparable under any noise [nats]."""
@@ -285,7 +285,7 @@ class Evidence:
                 rows = self.whiten(raw) / inflation
             weight = (nu + 1.0) / (nu + whitened * whitened)
             normal = (rows * weight[:, None]).T @ rows + np.diag(point.weights ** 2)
-            slope = rows.T @ (weight * whitened) - point.weights * point.strain
+            slope = rows.T @ (weight * whitened) - point.weights * point.prior_residuals
             scale = np.diag(normal) + 1e-12
             before, fell, hoped = cost, False, 1.0
             for _ in range(5):

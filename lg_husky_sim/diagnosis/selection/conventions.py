@@ -85,7 +85,7 @@ def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
         e = evidence.residuals(evidence.predict(point))
         weight = (nu + 1.0) / (nu + e * e)
         normal = (fit.jacobian * weight[:, None]).T @ fit.jacobian + np.diag(point.weights ** 2)
-        slope = fit.jacobian.T @ (weight * e) - point.weights * point.strain
+        slope = fit.jacobian.T @ (weight * e) - point.weights * point.prior_residuals
         # A number that acts nowhere, of an effect without a prior, may leave it singular.
         move = np.linalg.lstsq(normal, slope, rcond=None)[0]
         return evidence.cost(e, point) - 0.5 * float(slope @ move)

@@ -155,9 +155,9 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
     return Tried(hypothesis, best, base.cost - best.cost, evidence.count)
 
 
-def play_round(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
-               nominal: Point | None, least: float = 0.0,
-               seeds: Sequence[Tried] = ()) -> Round:
+def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
+                 nominal: Point | None, least: float = 0.0,
+                 seeds: Sequence[Tried] = ()) -> Round:
     """
     Look at hypotheses, fit the best of them and compare them under one noise.
 

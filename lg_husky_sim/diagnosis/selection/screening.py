@@ -64,7 +64,7 @@ class Projection:
         root = np.sqrt((nu + 1.0) / (nu + fit.whitened ** 2))
         stacked = np.vstack([fit.jacobian * root[:, None], np.diag(fit.point.weights)])
         base, _ = np.linalg.qr(stacked)
-        target = np.concatenate([root * fit.whitened, -fit.point.strain])
+        target = np.concatenate([root * fit.whitened, -fit.point.prior_residuals])
         target -= base @ (base.T @ target)
         self._weights = root * root
         self._base = np.ascontiguousarray((base[:count] * root[:, None]).T)

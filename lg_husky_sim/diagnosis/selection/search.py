@@ -18,8 +18,8 @@ from lg_husky_sim.diagnosis.selection.rounds import (
     attempt,
     calibrated,
     fitted,
+    forward_step,
     numbers_of,
-    play_round,
     Round,
     Tried,
     with_jitter,
@@ -108,7 +108,7 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, early: Sequence[Tried]) -> 
         The effect that is best at the nominal numbers, with numbers and noise of its own; none
         where the prior penalty of the recalibration is small.
     """
-    if 0.5 * float(np.sum(base.point.strain ** 2)) < setting('distorted'):
+    if 0.5 * float(np.sum(base.point.prior_residuals ** 2)) < setting('distorted'):
         return []
     names = [u.name for u in base.point.unknowns]
     if early and names == [u.name for u in rough.point.unknowns]:
@@ -214,8 +214,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     while len(rounds) < int(setting('most_effects')):
         number = len(rounds)
         progress(f'looking for effect {number + 1}', 0.1 + 0.25 * number)
-        one = play_round(evidence, base, hypotheses(base.point.structure),
-                         None if found else start, least, seeds)
+        one = forward_step(evidence, base, hypotheses(base.point.structure),
+                           None if found else start, least, seeds)
         seeds = []
         best = one.tried[0] if one.tried else None
         evidence = one.evidence

@@ -98,14 +98,14 @@ def impossible(fit: Fit, parameters: Parameters) -> tuple[Difference, ...]:
     most, load = setting('impossible'), setting('largest_load')
     numbers = fit.point.numbers
     said, certainty = [], 0.0
-    for unknown, strain in zip(fit.point.unknowns, fit.point.strain, strict=True):
+    for unknown, residual in zip(fit.point.unknowns, fit.point.prior_residuals, strict=True):
         name = unknown.name
         if unknown.kind == 'log':
             continue
         words = f'{name.replace("_", " ")} {numbers[name]:.3g}{_unit(numbers, name)}'
-        if unknown.kind == 'model' and abs(strain) > most:
+        if unknown.kind == 'model' and abs(residual) > most:
             said.append(f'{words} where the model has {parameters[name]:.3g}')
-            certainty = max(certainty, abs(float(strain)))
+            certainty = max(certainty, abs(float(residual)))
         elif unknown.kind == 'effect' and numbers.entry(name).unit == 'kg' and (
                 numbers[name] > load):
             said.append(f'{words} where {load:g} kg are the most that it carries')

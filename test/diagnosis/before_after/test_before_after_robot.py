@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from lg_husky_sim.diagnosis.before_after import diagnose_change, prediction
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
@@ -20,12 +21,14 @@ from lg_husky_sim.diagnosis.before_after.drives import Drive, drives, mean_comma
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
 from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of, Motion
+from lg_husky_sim.diagnosis.before_after.report import change_report
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.errors import DiagnosisError, RecordingError
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
+from lg_husky_sim.reporting.write import write_report
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
@@ -232,7 +235,7 @@ def test_a_change_without_a_name_is_unknown() -> None:
     block = Block(base, z, z, first_noise(known), (named,), 200.0, 1e-6)
     decision = decide(None, block, known)
     assert decision.named is None
-    assert decision.unnamed == 200.0
+    assert decision.unknown == 200.0
     found = finding(decision, known, 0.5)
     assert found is not None
     assert found.p_value == 1e-6
@@ -261,6 +264,21 @@ def test_the_model_that_is_written_drives_like_the_robot_after() -> None:
     assert said.augmented['wheel_speed_rmse'] < said.plain['wheel_speed_rmse']
     assert {'speed_loop', 'command_latency'} <= {e.id for e in said.model.structure.effects}
     assert said.mismatch[0].subsystem == 'drivetrain'
+
+
+def test_the_page_of_a_change_works_in_a_browser(
+        visited: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
+    case = worn()
+    write_report(change_report(case), tmp_path)
+    seen = visited(tmp_path / 'report.html')
+    assert seen['alive']
+    assert seen['recordings'] == ['rec1', 'rec2']
+    assert all(seen['drawn'])
+    assert seen['jumps']
+    for (name, low, high), one in zip(seen['jumps'], case.diagnosis.mismatch, strict=False):
+        assert name == one.recording
+        assert low < one.start <= one.end < high
+    assert len(set(seen['coloured'])) == 3
 
 
 def test_a_recording_that_is_too_short_is_refused_by_name() -> None:
