@@ -186,11 +186,11 @@ class NodeNames:
                     namespace = str(rule.value)
         namespace = '/' + namespace.strip('/')
         parts = namespace.strip('/').split('/') if namespace != '/' else []
-        for part in (name, *parts):
-            if not _TOKEN.match(part):
+        for kind, given, tokens in (('name', name, [name]), ('namespace', namespace, parts)):
+            if not all(map(_TOKEN.match, tokens)):
                 raise SettingsError(
-                    f'name {part!r} may hold letters, digits and underscores only, and may not '
-                    'begin with a digit')
+                    f'{kind} {given!r}: each part may hold letters, digits and underscores only, '
+                    'and may neither be empty nor begin with a digit')
         return cls(name, namespace, arguments)
 
     @property

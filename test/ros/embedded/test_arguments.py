@@ -52,8 +52,10 @@ def test_names_are_expanded_and_remapped() -> None:
     assert names.expand('~/x/y') == '/robot/twin/x/y'
     with pytest.raises(SettingsError, match="'/robot/a b' is not valid"):
         names.expand('a b')
-    with pytest.raises(SettingsError, match="name '1x' may hold letters"):
+    with pytest.raises(SettingsError, match=r"^name '1x': each part may hold letters"):
         NodeNames.resolve('1x', '', parse([]))
+    with pytest.raises(SettingsError, match=r"^namespace '/a//b': .* neither be empty"):
+        NodeNames.resolve('x', '/a//b', parse([]))
 
 
 @pytest.mark.parametrize(('section', 'applies'), [
