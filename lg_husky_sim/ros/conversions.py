@@ -191,20 +191,21 @@ def fill_imu(message: Any, nanoseconds: int, reading: Reading) -> None:
     accel.x, accel.y, accel.z = measured.accel
 
 
-def transform_message(parent: str, child: str) -> Any:
-    """Return a TFMessage with one transform between frames, or None without tf2_msgs."""
+def transform_message(parent: str, child: str, count: int = 1) -> Any:
+    """Return a TFMessage with a transform between frames, some times, or None without tf2_msgs."""
     kind = message_type('tf2_msgs/msg/TFMessage')
     if kind is None:
         return None
-    transform = message_type('geometry_msgs/msg/TransformStamped')()
-    transform.header.frame_id = parent
-    transform.child_frame_id = child
-    return kind(transforms=[transform])
+    transforms = [message_type('geometry_msgs/msg/TransformStamped')() for _ in range(count)]
+    for transform in transforms:
+        transform.header.frame_id = parent
+        transform.child_frame_id = child
+    return kind(transforms=transforms)
 
 
-def fill_transform(message: Any, nanoseconds: int, pose: Pose) -> None:
-    """Put the child's pose into a TFMessage."""
-    transform = message.transforms[0]
+def fill_transform(message: Any, nanoseconds: int, pose: Pose, index: int = 0) -> None:
+    """Put the child's pose into one transform of a TFMessage."""
+    transform = message.transforms[index]
     set_stamp(transform.header.stamp, nanoseconds)
     place = transform.transform.translation
     place.x, place.y = pose.x, pose.y

@@ -60,21 +60,23 @@ class Navigation:
     def __init__(self, node: Node, settings: Settings) -> None:
         """Make what the settings ask for; the frames of map and odometry are one at first."""
         self._node, self._settings = node, settings
-        self._steps = 0
         #: Pose of the truth's frame in the map.
         self._world = Pose()
         self._truth = Pose()
         self._map: OccupancyMap | None = None
         self._tf: Any = None
         self._scan: Any = None
-        # A stream of its own: the noise of other sensors does not depend on the scan.
-        self._random = np.random.default_rng((settings.seed, 1))
+        self._random = self._noise()
         if settings.publish_map_tf:
             self._tf = self._publisher('tf2_msgs/msg/TFMessage', 'tf', 100)
             self._tf_message = conversions.transform_message(
-                settings.map_frame, settings.odom_frame)
+                settings.map_frame, settings.odom_frame, 2)
         if settings.scan != 'none':
             self._start_scan()
+
+    def _noise(self) -> np.random.Generator:
+        # A stream of its own: the noise of other sensors does not depend on the scan.
+        return np.random.default_rng((self._settings.seed, 1))
 
     def _publisher(self, kind: str, topic: str, qos: Any) -> Any:
         message = message_type(kind)
@@ -129,13 +131,19 @@ class Navigation:
         """Let the robot be somewhere in the map, by moving the map."""
         self._world = compose(pose, inverse(self._truth))
 
-    def forget(self) -> None:
-        """Let the frames of map and odometry be one again."""
+    def forget(self, *, time: bool) -> None:
+        """Let the frames of map and odometry be one again; with the time, noise starts anew."""
         self._world = Pose()
+        if time:
+            self._random = self._noise()
 
-    def publish(self, reading: Reading, nanoseconds: int) -> None:
+    def locate(self, reading: Reading, nanoseconds: int) -> None:
         """
-        Publish what is due after a step.
+        Publish map to odom: at the step, and held until just before the next one.
+
+        Looked up at the step's stamp it is what it was then; from then on nobody waits for it.
+        One transform that is stamped a step ahead, as nav2_loopback_sim's, would put all that the
+        wheels drift in a step between the robot and what its sensors see.
 
         Parameters
         ----------
@@ -145,19 +153,32 @@ class Navigation:
             Stamp of the step.
 
         """
-        one, step = self._settings, self._steps
-        self._steps += 1
+        one = self._settings
         self._truth = reading.pose
-        if self._tf is not None:
-            # A robot whose odometry somebody else puts on tf is taken to be where that says.
-            shown = reading.wheel_pose if one.publish_tf and one.tf_source == 'wheels' else (
-                reading.pose)
-            # A step ahead, so that it is never this transform that a listener waits for.
-            conversions.fill_transform(
-                self._tf_message, nanoseconds + round(_SECOND * one.period),
-                compose(compose(self._world, reading.pose), inverse(shown)))
-            self._tf.publish(self._tf_message)
-        if self._scan is not None and step % self._every == 0:
+        if self._tf is None:
+            return
+        # A robot whose odometry somebody else puts on tf is taken to be where that says.
+        shown = reading.wheel_pose if one.publish_tf and one.tf_source == 'wheels' else (
+            reading.pose)
+        place = compose(compose(self._world, reading.pose), inverse(shown))
+        spacing = one.period if one.publish_clock else one.period / (one.speed or 1.0)
+        for index, stamp in enumerate((nanoseconds, nanoseconds + round(_SECOND * spacing) - 1)):
+            conversions.fill_transform(self._tf_message, stamp, place, index)
+        self._tf.publish(self._tf_message)
+
+    def publish(self, reading: Reading, nanoseconds: int) -> None:
+        """
+        Publish the scan, if one is due after a step.
+
+        Parameters
+        ----------
+        reading : Reading
+            Of the step.
+        nanoseconds : int
+            Stamp of the step.
+
+        """
+        if self._scan is not None and reading.step % self._every == 0:
             conversions.set_stamp(self._scan_message.header.stamp, nanoseconds)
             self._scan_message.ranges = self._ranges(reading.pose).astype(np.float32)
             self._scan.publish(self._scan_message)

@@ -33,7 +33,6 @@ class Outputs:
         self._node = node
         self._imu_late: deque[tuple[int, int, Reading]] = deque()
         self._wheels_late: deque[tuple[int, int, Reading]] = deque()
-        self._steps = 0
         self._said = -1
         self._tf: Any = None
         self._clock: Any = None
@@ -100,8 +99,7 @@ class Outputs:
             Stamp of the step.
 
         """
-        step = self._steps
-        self._steps += 1
+        step = reading.step
         self.clock(nanoseconds)
         conversions.fill_odometry(
             self._odometry_message, nanoseconds, reading.wheel_pose, reading.wheel_twist)

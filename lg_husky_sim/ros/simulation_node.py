@@ -141,6 +141,8 @@ class SimNode(Node):
                                       throttle_duration_sec=1.0)
         elif one.publish_map_tf:
             self.navigation.correct(pose)
+            if self.paused:
+                self.navigation.locate(self.engine.reading, self._stamp())
         else:
             self._restart(pose, time=False)
 
@@ -229,6 +231,9 @@ class SimNode(Node):
 
     def _publish(self) -> None:
         stamp = self._stamp() if self._timer is not None else self._now_stamp()
+        # Time first, and the transforms before what they are looked up for.
+        self.outputs.clock(stamp)
+        self.navigation.locate(self.engine.reading, stamp)
         self.outputs.publish(self.engine.reading, stamp)
         self.navigation.publish(self.engine.reading, stamp)
 
@@ -263,7 +268,7 @@ class SimNode(Node):
 
     def reset(self, *, time: bool) -> None:
         """Go to the initial pose at rest; optionally begin simulated time anew."""
-        self.navigation.forget()
+        self.navigation.forget(time=time)
         self._restart(None, time=time)
 
     def reset_clock(self) -> None:
