@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 import os
 from pathlib import Path
 import re
@@ -18,6 +18,13 @@ LARGEST = 4_000_000
 
 MOST_ALIASES = 100
 """A file with more references to anchors than this is refused: they can nest without end."""
+
+MOST_NODES = 500_000
+"""Most values and keys of a file, each reference counted as all that it refers to: 45 references
+in a row, each to two of the one before, are more than any memory holds."""
+
+LONGEST_NUMBER = 500
+"""Longest text that is read as a number: 1:1:1:… in base 60 takes time with its square."""
 
 DEEPEST = 50
 """Deepest nesting that is read; libyaml itself does not survive some ten thousand."""
@@ -42,6 +49,22 @@ def _unique_mapping(loader: Any, node: yaml.MappingNode) -> dict[Hashable, Any]:
 
 
 _Loader.add_constructor('tag:yaml.org,2002:map', _unique_mapping)
+
+
+def _short_number(kind: str) -> Callable[[Any, yaml.Node], object]:
+    construct = _Base.yaml_constructors[f'tag:yaml.org,2002:{kind}']
+
+    def number(loader: Any, node: yaml.Node) -> object:
+        if len(node.value) > LONGEST_NUMBER:
+            raise yaml.constructor.ConstructorError(
+                None, None, f'a number of more than {LONGEST_NUMBER} characters', node.start_mark)
+        value: object = construct(loader, node)
+        return value
+    return number
+
+
+for _kind in ('int', 'float'):
+    _Loader.add_constructor(f'tag:yaml.org,2002:{_kind}', _short_number(_kind))
 
 
 class _Dumper(yaml.SafeDumper):
@@ -80,18 +103,37 @@ def brief(error: Exception) -> str:
 
 
 def _refuse_bombs(text: str) -> None:
-    depth = aliases = 0
+    """Refuse what is deep, long or endless, by its events, before anything is made of it."""
+    aliases = 0
+    sizes: dict[str, int] = {}
+    # Of what is open: anchor, and nodes so far; at the bottom, all of the file.
+    inside: list[tuple[str | None, int]] = [(None, 0)]
     for event in yaml.parse(text, _Base):
+        anchor, size = getattr(event, 'anchor', None), 1
         if isinstance(event, yaml.events.CollectionStartEvent):
-            depth += 1
+            inside.append((anchor, 1))
+            if anchor:
+                sizes[anchor] = 0
+            size = 0
         elif isinstance(event, yaml.events.CollectionEndEvent):
-            depth -= 1
+            anchor, size = inside.pop()
+            if anchor:
+                sizes[anchor] = size
         elif isinstance(event, yaml.events.AliasEvent):
             aliases += 1
-        if depth > DEEPEST:
+            # libyaml itself refuses what is not defined, later.
+            size = sizes.get(str(event.anchor), 1)
+            if size == 0:
+                raise yaml.YAMLError(f'{event.anchor} contains itself')
+        elif anchor:
+            sizes[anchor] = 1
+        inside[-1] = inside[-1][0], inside[-1][1] + size
+        if len(inside) - 1 > DEEPEST:
             raise yaml.YAMLError(f'nested deeper than {DEEPEST} levels')
         if aliases > MOST_ALIASES:
             raise yaml.YAMLError(f'more than {MOST_ALIASES} aliases')
+        if inside[-1][1] > MOST_NODES:
+            raise yaml.YAMLError(f'more than {MOST_NODES} values')
 
 
 def shown(value: object) -> str:
@@ -104,7 +146,7 @@ def _reason(error: Exception) -> str:
     mark = getattr(error, 'problem_mark', None)
     if mark is None:
         return ' '.join(str(error).split())[:200]
-    problem = ' '.join(str(getattr(error, 'problem', error)).split())
+    problem = ' '.join(str(getattr(error, 'problem', error)).split())[:200]
     return f'{problem} in line {mark.line + 1}, column {mark.column + 1}'
 
 
@@ -130,7 +172,8 @@ def parse_yaml(text: str) -> object:
     try:
         _refuse_bombs(text)
         return yaml.load(text, _Loader)  # noqa: S506 (a subclass of the safe loader)
-    except (yaml.YAMLError, ValueError, TypeError, AttributeError, KeyError) as error:
+    except (yaml.YAMLError, ValueError, TypeError, AttributeError, KeyError,
+            OverflowError) as error:
         raise ValueError(f'not YAML: {_reason(error)}') from error
 
 
