@@ -156,8 +156,10 @@ def test_another_publisher_is_named_once(probe: Probe, made: list[SimNode]) -> N
                                  'who listens gets both']
     assert said('in: ') == ['in: /crowd/husky_velocity_controller/cmd_vel, /crowd/initialpose '
                             '(Twist)']
-    assert '/crowd/joint_states, /crowd/imu_um7/data, /crowd/battery_state, /crowd/tf' in said(
-        'out: ')[0]
+    # common_interfaces has no tf2_msgs; what is not there is not announced.
+    tf = ', /crowd/tf' if api.message_type('tf2_msgs/msg/TFMessage') else ''
+    assert said('out: ')[0].endswith(
+        f'/crowd/joint_states, /crowd/imu_um7/data, /crowd/battery_state{tf}')
 
 
 def test_parameters_of_others_are_left_alone(probe: Probe, made: list[SimNode]) -> None:
@@ -237,6 +239,7 @@ def test_a_parameter_can_change_by_the_api_and_is_checked(
 def test_what_cannot_be_published_is_not_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without tf2_msgs, which is not in common_interfaces, the start-up log lists no tf."""
     settings = make_settings({'scan': 'free', 'publish_scan_tf': True})
+    monkeypatch.setattr(neighbours, 'message_type', lambda name: object)
     assert neighbours.shared(settings) == ('tf', 'tf_static')
     monkeypatch.setattr(neighbours, 'message_type', lambda name: None)
     assert neighbours.shared(settings) == ()
