@@ -94,17 +94,20 @@ def fit_recordings(base: Base, drives: Sequence[Drive], begin: FloatArray,
     first = min(firsts, key=lambda fit: fit.cost).z
     share(0.2)
 
-    def fitted(name: str, about: Prior, options: Sequence[FloatArray], until: float
+    def fitted(name: str, about: Prior, kinds: Sequence[Sequence[FloatArray]], until: float
                ) -> SetFit:
+        def cost(start: FloatArray) -> float:
+            return cost_at(base, groups[name], about, noise, start, map)
+
         def fit(start: FloatArray, at_most: int) -> SetFit:
             return fit_set(base, groups[name], about, noise, start, at_most, until, map)
-        nearest = sorted(options, key=lambda one: cost_at(
-            base, groups[name], about, noise, one, map))[:int(numbers['raced'])]
-        begun = min((fit(one, int(numbers['race_steps'])) for one in nearest),
+        nearest = sorted(((cost(one), k, one) for k, kind in enumerate(kinds) for one in [
+            min(kind, key=cost)]), key=lambda one: one[:2])[:int(numbers['raced'])]
+        begun = min((fit(one, int(numbers['race_steps'])) for _, _, one in nearest),
                     key=lambda one: one.cost)
         return fit(begun.z, steps)
     names = list(groups)
-    options = [*kinds, *_shifted(base, free, first)]
+    options = [[one] for one in (*kinds, *_shifted(base, free, first))]
     places = dict(zip(names, pool.map(lambda name: first if name == longest else fitted(
         name, prior, options, roughly).z, names), strict=True))
     share(0.4)
@@ -116,13 +119,16 @@ def fit_recordings(base: Base, drives: Sequence[Drive], begin: FloatArray,
         common = _mean(base, prior, wide, places, _quadratics(
             base, groups, noise, prior, places, pool))
         about = Prior(common, wide, free)
-        others = [one for other in (common, *places.values()) for one in (
-            [other] if turn else _shifted(base, free, other))]
+        ends = [common, *places.values()]
+        # Of starts of a kind that begin at different ends, the likeliest.
+        others = [[one] for one in ends] if turn else list(zip(
+            *(_shifted(base, free, one) for one in ends), strict=True))
 
-        def again(name: str, about: Prior = about, others: Sequence[FloatArray] = others,
-                  places: Places = places, until: float = until) -> FloatArray:
-            fits = [fitted(name, about, [places[name]], until), fitted(name, about, [
-                one for one in others if one is not places[name]], until)]
+        def again(name: str, about: Prior = about,
+                  others: Sequence[Sequence[FloatArray]] = others, places: Places = places,
+                  until: float = until) -> FloatArray:
+            fits = [fitted(name, about, [[places[name]]], until), fitted(name, about, [
+                kind for kind in others if kind[0] is not places[name]], until)]
             return min(fits, key=lambda fit: fit.cost).z
         places = dict(zip(names, pool.map(again, names), strict=True))
         share(0.65 + 0.2 * turn)
