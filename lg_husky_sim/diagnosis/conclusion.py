@@ -95,7 +95,8 @@ def without_undetermined(evidence: Evidence, fit: Fit) -> Point:
     -------
     Point
         Numbers of the robot are nominal there. One that cannot be so, because the data are
-        explained worse then than at the end of a 95 % interval, stays as it was fitted.
+        explained worse then than at the end of a 95 % interval or because there is no such
+        model, stays as it was fitted.
     """
     point = fit.point
     idle = {p.name: neutral_of(p) for e in point.structure.effects for p in e.parameters()}
