@@ -319,9 +319,17 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
 
 
 def _explained(search: Search) -> float:
-    # What the adopted effects gain under the noise that remains with them.
-    evidence, plain = search.evidence, search.plain
-    return evidence.cost(evidence.residuals(plain.predicted), plain.point) - search.final.cost
+    # What the adopted effects gain under the noise that remains with them, over the robot as it
+    # may be: numbers beyond all tolerances would do the effect's work.
+    evidence, plain = search.evidence, search.plain.point
+    room = setting('most_tolerances')
+    if np.any(np.abs(plain.prior_residuals) > room):
+        held = tuple(replace(u, lower=max(u.lower, u.centre - room * u.deviation),
+                             upper=min(u.upper, u.centre + room * u.deviation))
+                     for u in plain.unknowns)
+        plain = evidence.fit(replace(plain, unknowns=held).at(plain.places)).point
+    return (evidence.cost(evidence.residuals(evidence.predict(plain)), plain)
+            - search.final.cost)
 
 
 def unknown_finding(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> Finding:

@@ -6,40 +6,58 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
-from lg_husky_sim.diagnosis.evidence.evidence import beginning, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit, Point
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
-from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.observation import Reading, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
-from lg_husky_sim.diagnosis.selection.rounds import calibrated, Tried
-from lg_husky_sim.diagnosis.selection.search import seeds_of
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
+from lg_husky_sim.diagnosis.selection import search as searching
+from lg_husky_sim.diagnosis.selection.conventions import best_reading
+from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted, Tried
+from lg_husky_sim.diagnosis.selection.screening import look
+from lg_husky_sim.diagnosis.selection.search import (
+    Logged,
+    read_anew,
+    search,
+    seeds_of,
+)
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.recording import Recording
+import pytest
 
 Recorded = Callable[..., Recording]
 Steps = Sequence[tuple[float, float, float]]
 
 
-def _seeded(recording: Recording) -> tuple[Fit, list[Tried]]:
+def _begun(recording: Recording, pool: ThreadPoolExecutor) -> tuple[Evidence, Point]:
     drives, model = drives_of([recording]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
+    return evidence_of(drives, [recording.name], start, first_guess(drives), pool), start
+
+
+def _seeded(recording: Recording) -> tuple[Fit, list[Tried]]:
     with ThreadPoolExecutor(1) as pool:
-        first = evidence_of(drives, [recording.name], start, first_guess(drives), pool)
+        first, start = _begun(recording, pool)
         _, base = calibrated(first, start, 1)
-        return base, seeds_of(first, first.fit(start, rounds=1), base, ())
+        return base, seeds_of(first, first.fit(start, rounds=1), base, Logged(base))
+
+
+def _with_loop(sizes: dict[str, float]) -> Plant:
+    model, loop = load_model(), Effect('speed_loop')
+    return compile_model(model.structure.with_effect(loop)).at(
+        model.parameters.with_entries(*entries_of(loop, sizes)))
 
 
 def test_a_speed_loop_is_a_seed_where_the_numbers_of_the_robot_took_its_place(
         record: Recorded, steps: Steps) -> None:
-    model, loop = load_model(), Effect('speed_loop')
-    sizes = {'loop_lag': 0.3, 'loop_gain': 1.0, 'loop_integral': 10.0}
-    plant = compile_model(model.structure.with_effect(loop)).at(
-        model.parameters.with_entries(*entries_of(loop, sizes)))
+    plant = _with_loop({'loop_lag': 0.3, 'loop_gain': 1.0, 'loop_integral': 10.0})
     base, seeds = _seeded(record('loop', plant, steps, 1))
     assert max(abs(base.point.prior_residuals)) > 5.0
     assert [one.hypothesis.effect.id for one in seeds] == ['speed_loop']
@@ -51,3 +69,45 @@ def test_a_robot_within_its_tolerances_has_no_seeds(record: Recorded, steps: Ste
     model = load_model()
     plant = compile_model(model.structure).at(model.parameters)
     assert _seeded(record('clean', plant, steps, 1))[1] == []
+
+
+def test_each_early_effect_is_read_anew(record: Recorded, steps: Steps) -> None:
+    plant = _with_loop({'loop_lag': 0.45, 'loop_gain': 2.0, 'loop_integral': 10.0})
+    with ThreadPoolExecutor(1) as pool:
+        first, start = _begun(record('loop', plant, steps, 1), pool)
+        rough = first.fit(start, rounds=1)
+        pool_of = [h for h in hypotheses(start.structure)
+                   if h.label in ('speed_loop', 'payload:ground')]
+        early = fitted(first, rough, look(first, rough, pool_of), [rough.point], whole=False)
+        assert len(early) == 2
+        found = read_anew(first, rough, early[::-1])
+        assert found is not None
+        assert read_anew(first, rough, ()) is None
+        _, hypothesis, point = found
+        cost = first.cost(first.residuals(first.predict(point)), point)
+        read = {t.hypothesis.label: best_reading(first, t.fit) for t in early}
+    assert hypothesis.label == 'speed_loop'
+    assert point.reading == read['speed_loop'].point.reading != rough.point.reading
+    assert [u.name for u in point.unknowns[-3:]] == [p.name for p in hypothesis.free]
+    assert cost == pytest.approx(min(one.cost for one in read.values()))
+
+
+def test_a_reading_that_came_with_a_seed_goes_with_it(
+        record: Recorded, steps: Steps, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+
+    def misled(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tried]:
+        latency = next(h for h in hypotheses(base.point.structure)
+                       if h.effect.id == 'command_latency')
+        slow = replace(base.point, reading=Reading(wheels=WheelReading.FILTERED).replacing(
+            {'wheel_window': 0.1}))
+        fit = first.fit(latency.point(slow, {'latency': 0.01}), rounds=1)
+        return [Tried(latency, fit, 100.0, first.count)]
+
+    monkeypatch.setattr(searching, 'seeds_of', misled)
+    with ThreadPoolExecutor(1) as pool:
+        first, start = _begun(record('clean', plant, steps[:6], 1), pool)
+        found = search(first, start, lambda *_: None)
+    assert found.found == ()
+    assert found.final.point.reading == Reading()

@@ -43,7 +43,8 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
         tried = []
         for one in kept:
             try:
-                fit = evidence.fit(_with(plain, final.point, [h for h in kept if h is not one]))
+                fit = evidence.fit(with_effects(plain, final.point,
+                                                [h for h in kept if h is not one]))
             except LgHuskyError:
                 # The others do not go without it.
                 continue
@@ -62,8 +63,22 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
     return final, kept
 
 
-def _with(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Point:
-    """Return the final point with some of its effects only."""
+def with_effects(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Point:
+    """
+    Return a fitted point with some of its effects only, read as it is.
+
+    Parameters
+    ----------
+    plain : Point
+        The model without effects.
+    final : Point
+    kept : sequence of Hypothesis
+        Their numbers come last.
+
+    Returns
+    -------
+    Point
+    """
     base = [place for place, unknown in enumerate(final.unknowns) if unknown.kind != 'effect']
     point = replace(plain, reading=final.reading, places=np.array(final.places[base]),
                     unknowns=tuple(final.unknowns[place] for place in base))

@@ -11,9 +11,9 @@ from lg_husky_sim.diagnosis.evidence.base_clock import ticking
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit, Point
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import start_of, tick_unknowns
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, Numbers
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
-from lg_husky_sim.diagnosis.selection.elimination import eliminated
+from lg_husky_sim.diagnosis.selection.elimination import eliminated, with_effects
 from lg_husky_sim.diagnosis.selection.rounds import (
     attempt,
     calibrated,
@@ -26,6 +26,7 @@ from lg_husky_sim.diagnosis.selection.rounds import (
 )
 from lg_husky_sim.diagnosis.selection.screening import look
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 Progress = Callable[[str, float], None]
@@ -60,18 +61,36 @@ class Search:
         return self.rounds[:len(self.found)]
 
 
-def _as_logged(evidence: Evidence, base: Fit) -> tuple[Fit, list[Tried]]:
-    # A missing effect can pass for another reading of the sensors. Where an effect promises more
-    # than the reading gains, the reading waits for what the effect really gains; those that do are
-    # returned, best first.
+@dataclass(frozen=True, eq=False)
+class Logged:
+    """
+    A reading of the sensors, or effects that pass for one.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of the base: with the likeliest reading, or with the usual one where an effect promises
+        more than the reading gains and the reading waits for what the effect really gains.
+    better : sequence of Tried
+        The effects that promise more, best first.
+    early : sequence of Tried
+        All that were fitted under the usual reading, best first.
+    """
+
+    fit: Fit
+    better: Sequence[Tried] = ()
+    early: Sequence[Tried] = ()
+
+
+def _as_logged(evidence: Evidence, base: Fit) -> Logged:
     chosen = best_reading(evidence, base)
     if chosen is base:
-        return base, []
+        return Logged(base)
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
     seen = look(evidence, base, pool)[:int(setting('early_effects'))]
-    better = [t for t in fitted(evidence, base, seen, [base.point], whole=False)
-              if t.gain > _promised(base, chosen)]
-    return (base if better else chosen), better
+    early = fitted(evidence, base, seen, [base.point], whole=False)
+    better = [t for t in early if t.gain > _promised(base, chosen)]
+    return Logged(base if better else chosen, better, early)
 
 
 def _promised(base: Fit, chosen: Fit) -> float:
@@ -86,7 +105,7 @@ def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]
     return evidence, evidence.fit(with_jitter(chosen.point, evidence))
 
 
-def seeds_of(first: Evidence, rough: Fit, base: Fit, early: Sequence[Tried]) -> list[Tried]:
+def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tried]:
     """
     Return what to begin with where recalibrated numbers have taken the place of an effect.
 
@@ -98,38 +117,84 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, early: Sequence[Tried]) -> 
         Of the nominal model under it, after one step.
     base : Fit
         Recalibrated.
-    early : sequence of Tried
-        Effects that promised more there than another reading of the sensors; where there are
-        none, those that promise most at the nominal numbers are looked for.
+    logged : Logged
+        Effects that were fitted there: those that promised more than another reading of the
+        sensors, or all, each with a reading of its own. Beside these, unless one promised more,
+        those that promise most at the nominal numbers are looked for.
 
     Returns
     -------
     list of Tried
-        The effect that is best at the nominal numbers, with numbers and noise of its own; none
+        The effect that gains most from there, with numbers, noise and reading of its own; none
         where the prior penalty of the recalibration is small.
     """
     if 0.5 * float(np.sum(base.point.prior_residuals ** 2)) < setting('distorted'):
         return []
     names = [u.name for u in base.point.unknowns]
-    if early and names == [u.name for u in rough.point.unknowns]:
-        begins = [(early[0].hypothesis, early[0].fit.point.places[:len(names)],
-                   numbers_of(early[0]))]
-        evidence = first
+    found = []
+    if logged.better and names == [u.name for u in rough.point.unknowns]:
+        best = logged.better[0]
+        found.append(_best_start(first, rough, [(
+            best.hypothesis, best.fit.point.places[:len(names)], numbers_of(best))]))
     else:
+        found.append(read_anew(first, base, logged.early))
         nominal = _nominal(base.point)
-        evidence = first.about(nominal)
-        rough = evidence.fit(nominal, rounds=1)
+        first = first.about(nominal)
+        rough = first.fit(nominal, rounds=1)
         pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
-        begins = [(one.hypothesis, rough.point.places, one.numbers)
-                  for one in look(evidence, rough, pool)[:int(setting('early_effects'))]]
-    fits = [attempt(evidence, rough, hypothesis, [(rough.point.at(places), start) for start in (
+        found.append(_best_start(first, rough, [
+            (one.hypothesis, rough.point.places, one.numbers)
+            for one in look(first, rough, pool)[:int(setting('early_effects'))]]))
+    seeds = [_own(*one, base) for one in found if one is not None]
+    return [max(seeds, key=lambda one: one.score)] if seeds else []
+
+
+def _best_start(evidence: Evidence, base: Fit, begins: Sequence[tuple[
+        Hypothesis, FloatArray, Numbers]]) -> tuple[Evidence, Hypothesis, Point] | None:
+    fits = [attempt(evidence, base, hypothesis, [(base.point.at(places), start) for start in (
         numbers, *hypothesis.starts)], whole=False) for hypothesis, places, numbers in begins]
     tried = [one for one in fits if one is not None]
     if not tried:
-        return []
+        return None
     best = max(tried, key=lambda one: one.score)
-    own, fit = calibrated(evidence, best.fit.point, 1)
-    return [Tried(best.hypothesis, fit, own.fit(base.point).cost - fit.cost, own.count)]
+    return evidence, best.hypothesis, best.fit.point
+
+
+def read_anew(evidence: Evidence, base: Fit, early: Sequence[Tried]
+              ) -> tuple[Evidence, Hypothesis, Point] | None:
+    """
+    Return the likeliest of some effects if each has a reading of its own.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    base : Fit
+        Without effects.
+    early : sequence of Tried
+
+    Returns
+    -------
+    tuple of (Evidence, Hypothesis, Point) or None
+        None where there are no effects.
+    """
+    read = [(best_reading(evidence, one.fit), one.hypothesis) for one in early]
+    if not read:
+        return None
+    fit, hypothesis = min(read, key=lambda one: one[0].cost)
+    return evidence, hypothesis, with_effects(base.point, fit.point, [hypothesis])
+
+
+def _own(evidence: Evidence, hypothesis: Hypothesis, point: Point, base: Fit) -> Tried:
+    # Under noise of its own.
+    own, fit = calibrated(evidence, point, 1)
+    return Tried(hypothesis, fit, own.fit(base.point).cost - fit.cost, own.count)
+
+
+def _read_like(evidence: Evidence, base: Fit, seed: Tried) -> tuple[Fit, Tried]:
+    # The base, and the seed's gain over it, if the log was made as the seed says.
+    plain = evidence.fit(with_effects(base.point, seed.fit.point, []))
+    fit = evidence.fit(seed.fit.point)
+    return plain, Tried(seed.hypothesis, fit, plain.cost - fit.cost, evidence.count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +203,7 @@ class _Recalibrated:
 
     first: Evidence
     rough: Fit
-    early: Sequence[Tried]
+    logged: Logged
     evidence: Evidence
     base: Fit
 
@@ -146,9 +211,9 @@ class _Recalibrated:
 def _recalibrated(evidence: Evidence, start: Point) -> _Recalibrated:
     # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
     rough = evidence.fit(start, rounds=1)
-    chosen, early = _as_logged(evidence, rough)
-    start = _nominal(chosen.point)
-    return _Recalibrated(evidence, rough, early, *calibrated(evidence.about(start), start))
+    logged = _as_logged(evidence, rough)
+    start = _nominal(logged.fit.point)
+    return _Recalibrated(evidence, rough, logged, *calibrated(evidence.about(start), start))
 
 
 def _at_ticks(known: _Recalibrated, start: Point, progress: Progress) -> _Recalibrated | None:
@@ -199,12 +264,20 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     if ticked is not None:
         known = ticked
     evidence, base = known.evidence, known.base
-    seeds = seeds_of(known.first, known.rough, base, known.early)
-    chosen, better = _as_logged(evidence, base)
-    if seeds and seeds[0].gain > _promised(base, chosen):
-        chosen, better = base, seeds
-    postponed = bool(better)
-    evidence, base = _read_as(evidence, base, chosen)
+    seeds = seeds_of(known.first, known.rough, base, known.logged)
+    otherwise = None
+    if seeds and seeds[0].fit.point.reading != base.point.reading:
+        # Counted against the base with its own reading.
+        if seeds[0].score > 0.0:
+            otherwise = evidence, base
+            base, seeds[0] = _read_like(evidence, base, seeds[0])
+        else:
+            seeds = []
+    logged = Logged(base) if otherwise else _as_logged(evidence, base)
+    if seeds and seeds[0].gain > _promised(base, logged.fit):
+        logged = Logged(base, seeds)
+    postponed = bool(logged.better)
+    evidence, base = _read_as(evidence, base, logged.fit)
     usual = Reading()
     start = _nominal(base.point)
     plain = base
@@ -228,9 +301,13 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
                 evidence, base = _read_as(evidence, one.base, chosen)
                 start = _nominal(base.point)
                 continue
+        if otherwise is not None and not found and not adopted:
+            evidence, base = otherwise
+            otherwise, start = None, _nominal(base.point)
+            continue
         rounds.append(one)
         if number == 0:
-            plain = one.base
+            plain = one.base if otherwise is None else one.evidence.fit(otherwise[1].point)
         if not adopted or best is None:
             base = one.base
             break
