@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import math
 
-from lg_husky_sim.diagnosis.decision import confidence
 from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
+from lg_husky_sim.diagnosis.decision.confidence import confidence, Features
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
 from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import neutral_of
@@ -277,7 +277,7 @@ class Answer:
 
     verdict: Verdict
     sure: float
-    features: confidence.Features
+    features: Features
 
 
 def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> Answer:
@@ -304,18 +304,19 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     tried = first.tried
     if not search.adopted:
         gain = max(tried[0].gain, 0.0) if tried else 0.0
-        features = confidence.Features(gain, 0.0, explained / max(gain, 1.0), first.chance)
-        if is_left:
-            return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
-        return Answer(Verdict.NOTHING_MISSING, confidence.of_nothing(features), features)
+        features = Features(gain, 0.0, explained / max(gain, 1.0), first.chance)
+        return _sure(Verdict.UNKNOWN if is_left else Verdict.NOTHING_MISSING, features)
     best = tried[0]
     second = max((t.score for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id
                   and not is_negligible(t, first.evidence.noise.values)), default=0.0)
-    features = confidence.Features(best.gain, 1.0 - max(second, 0.0) / max(best.score, 1e-9),
-                                   explained / max(_explained(search), best.gain), first.chance)
-    if is_left and features.share > setting('unknown_share'):
-        return Answer(Verdict.UNKNOWN, confidence.of_unknown(features), features)
-    return Answer(Verdict.KNOWN, confidence.of_name(features), features)
+    features = Features(best.gain, 1.0 - max(second, 0.0) / max(best.score, 1e-9),
+                        explained / max(_explained(search), best.gain), first.chance)
+    is_unknown = is_left and features.share > setting('unknown_share')
+    return _sure(Verdict.UNKNOWN if is_unknown else Verdict.KNOWN, features)
+
+
+def _sure(verdict: Verdict, features: Features) -> Answer:
+    return Answer(verdict, confidence(verdict, features), features)
 
 
 def _explained(search: Search) -> float:

@@ -4,7 +4,7 @@
 Coefficients of the confidence, from the outcomes of trials.
 
 For each verdict the share right is a logistic function of what informs about it,
-``p = 1 / (1 + exp(-(c0 + c1 x1 + c2 x2)))``. The coefficients maximise the likelihood of the
+``p = 1 / (1 + exp(-(c0 + c1 x)))``. The coefficients maximise the likelihood of the
 outcomes with independent Gaussian priors around zero, and around a stated share right for c0, so
 that few outcomes do not make certainty.
 """
@@ -15,6 +15,8 @@ from collections.abc import Mapping, Sequence
 import math
 from typing import Any
 
+from lg_husky_sim.diagnosis.decision.confidence import COEFFICIENTS, informs
+from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.proof.scoring import judge
 from lg_husky_sim.proof.settings import settings
@@ -25,23 +27,6 @@ from scipy.optimize import minimize
 Json = Mapping[str, Any]
 
 FloatArray = NDArray[np.float64]
-
-#: Verdict to the names of its coefficients in the settings of the diagnosis.
-COEFFICIENTS = {
-    'known': ('name_constant', 'name_margin', 'name_share'),
-    'nothing_missing': ('nothing_constant', 'nothing_chance'),
-    'unknown': ('unknown_constant', 'unknown_share_slope'),
-}
-
-
-def _row(verdict: str, features: Json) -> list[float]:
-    """Return what multiplies the coefficients of a verdict."""
-    margin, share = float(features['margin']), float(features['share'])
-    if verdict == 'known':
-        return [1.0, math.log(max(margin, 1e-3)), math.log1p(min(max(share, 0.0), 10.0))]
-    if verdict == 'nothing_missing':
-        return [1.0, math.log10(max(float(features['chance']), 1e-12))]
-    return [1.0, math.log(max(share, 1e-3))]
 
 
 def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
@@ -63,16 +48,18 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
     LgHuskyError
         If features are damaged, or no outcome has any.
     """
-    rows: dict[str, list[list[float]]] = {name: [] for name in COEFFICIENTS}
-    right: dict[str, list[float]] = {name: [] for name in COEFFICIENTS}
+    rows: dict[str, list[list[float]]] = {one.value: [] for one in COEFFICIENTS}
+    right: dict[str, list[float]] = {one.value: [] for one in COEFFICIENTS}
     for line in lines:
         mark = judge(line).right
         if line.get('features') and line['verdict'] in rows and mark is not None:
             try:
-                row = _row(line['verdict'], line['features'])
+                features = line['features']
+                row = [1.0, informs(Verdict(line['verdict']), float(features['share']),
+                                    float(features['chance']))]
             except (KeyError, TypeError, ValueError) as error:
                 raise LgHuskyError(f'case {line["case"]}: the features of its confidence need the '
-                                   f'numbers margin, share and chance: {error}') from error
+                                   f'numbers share and chance: {error}') from error
             rows[line['verdict']].append(row)
             right[line['verdict']].append(mark)
     if not any(right.values()):
@@ -80,8 +67,8 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
                            'earlier version, or all of before and after')
     found = {}
     for verdict, names in COEFFICIENTS.items():
-        x = np.array(rows[verdict]).reshape(-1, len(names))
-        y = np.array(right[verdict])
+        x = np.array(rows[verdict.value]).reshape(-1, len(names))
+        y = np.array(right[verdict.value])
         for name, value in zip(names, _fit(x, y), strict=True):
             found[name] = (value, y.size, int(np.sum(y)))
     return found

@@ -30,23 +30,22 @@ def line(name: str, right: bool, **features: Any) -> dict[str, Any]:
 
 
 def lines(count: int) -> list[dict[str, Any]]:
-    """Return outcomes whose share right rises with the margin."""
+    """Return outcomes that are wrong the oftener the more a smooth effort explains."""
     rng = np.random.default_rng(2)
-    margins = rng.uniform(0.02, 1.0, count)
-    return [line(f'c{i}', bool(rng.uniform() < m), margin=m, share=0.1, chance=1e-9)
-            for i, m in enumerate(margins)]
+    shares = rng.uniform(0.02, 1.0, count)
+    return [line(f'c{i}', bool(rng.uniform() > s), margin=0.5, share=s, chance=1e-9)
+            for i, s in enumerate(shares)]
 
 
-def test_a_margin_that_informs_gets_weight_and_the_share_right_is_kept() -> None:
+def test_a_share_that_informs_gets_weight_and_the_share_right_is_kept() -> None:
     rows = lines(400)
     found = calibrated(rows)
-    constant, margin, share = (found[n][0] for n in (
-        'name_constant', 'name_margin', 'name_share'))
-    assert margin > 0.5
-    stated = [1.0 / (1.0 + np.exp(-(constant + margin * np.log(r['features']['margin'])
-                                    + share * np.log1p(0.1)))) for r in rows]
-    assert np.mean(stated) == pytest.approx(found['name_margin'][2] / 400, abs=0.02)
-    assert found['name_margin'][1] == 400
+    constant, share = (found[n][0] for n in ('name_constant', 'name_share'))
+    assert share < -0.5
+    stated = [1.0 / (1.0 + np.exp(-(constant + share * np.log(r['features']['share']))))
+              for r in rows]
+    assert np.mean(stated) == pytest.approx(found['name_share'][2] / 400, abs=0.02)
+    assert found['name_share'][1] == 400
     assert found['unknown_constant'][1] == 0
 
 
@@ -56,7 +55,7 @@ def test_few_outcomes_do_not_make_certainty() -> None:
 
 
 @pytest.mark.parametrize(('features', 'named'), [
-    ({'margin': 0.5, 'share': 0.1}, 'case bad'), ({'margin': None, 'share': 0.1, 'chance': 1.0},
+    ({'margin': 0.5, 'share': 0.1}, 'case bad'), ({'margin': 0.5, 'share': None, 'chance': 1.0},
                                                   'case bad'), ({}, 'no outcome')])
 def test_outcomes_without_what_it_needs_are_refused(features: dict[str, Any], named: str) -> None:
     damaged = {**line('bad', True, **features), 'verdict': 'nothing_missing'}
@@ -72,6 +71,6 @@ def test_command_prints_what_stands_in_the_settings(
     outcomes.write(path, {'command': 'c', 'commit': 'x', 'planned': 5, 'seal': '', 'seeds': '-',
                           'set': 'tuning'}, lines(5))
     assert run(['prove', '--from', str(path), '--calibrate']) == 0
-    assert 'name_margin: ' in capsys.readouterr().out
+    assert 'name_share: ' in capsys.readouterr().out
     assert run(['prove', '--calibrate']) != 0
     assert '--from' in capsys.readouterr().err

@@ -1,12 +1,14 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How sure an answer is, by logistic functions of what informs about it.
+How sure an answer is, by a logistic function of what informs about it.
 
-Posterior odds carry no information: the form of no law is exact, so that they are near 1 for right
-and wrong names alike. What informs is the margin to the next name that is not negligible,
-``1 - score_2 / score_1`` (score: gain less what its numbers cost), what a smooth effort still
-explains as a share of what the name explains, and how far a gain is beyond chance.
+For each verdict ``p = 1 / (1 + exp(-(c0 + c1 x)))``. Posterior odds carry no information: the form
+of no law is exact, so that they are near 1 for right and wrong names alike. Neither does the
+margin to the next name: where it is small, the names are declared not to be told apart. What
+informs of a name, and of ``unknown``, is what a smooth effort still explains as a share of what
+the name explains, ``x = log(share)``; of ``nothing``, how far the largest gain is beyond chance,
+``x = log10(chance)``.
 """
 
 from __future__ import annotations
@@ -14,7 +16,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
+from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.settings import setting
+
+#: Verdict to the settings that are its coefficients, c0 and c1.
+COEFFICIENTS = {
+    Verdict.KNOWN: ('name_constant', 'name_share'),
+    Verdict.NOTHING_MISSING: ('nothing_constant', 'nothing_chance'),
+    Verdict.UNKNOWN: ('unknown_constant', 'unknown_share_slope'),
+}
 
 
 @dataclass(frozen=True)
@@ -41,24 +51,28 @@ class Features:
     chance: float
 
 
-def _logistic(value: float) -> float:
-    return 1.0 / (1.0 + math.exp(-min(max(value, -30.0), 30.0)))
+def informs(verdict: Verdict, share: float, chance: float) -> float:
+    """
+    Return what informs about a verdict, x.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    share, chance : float
+        As in :class:`Features`.
+
+    Returns
+    -------
+    float
+        Bounded: what is below the least share, or chance, is told apart by nobody.
+    """
+    if verdict is Verdict.NOTHING_MISSING:
+        return math.log10(max(chance, setting('least_chance')))
+    return math.log(max(share, setting('least_told_share')))
 
 
-def of_name(features: Features) -> float:
-    """Return how likely the first name is right."""
-    return _logistic(setting('name_constant')
-                     + setting('name_margin') * math.log(max(features.margin, 1e-3))
-                     + setting('name_share') * math.log1p(min(max(features.share, 0.0), 10.0)))
-
-
-def of_nothing(features: Features) -> float:
-    """Return how likely it is that nothing is missing."""
-    return _logistic(setting('nothing_constant')
-                     + setting('nothing_chance') * math.log10(max(features.chance, 1e-12)))
-
-
-def of_unknown(features: Features) -> float:
-    """Return how likely it is that what is missing has no name."""
-    return _logistic(setting('unknown_constant')
-                     + setting('unknown_share_slope') * math.log(max(features.share, 1e-3)))
+def confidence(verdict: Verdict, features: Features) -> float:
+    """Return how likely a verdict, with its first name, is right."""
+    constant, slope = (setting(name) for name in COEFFICIENTS[verdict])
+    return 1.0 / (1.0 + math.exp(-constant - slope * informs(
+        verdict, features.share, features.chance)))
