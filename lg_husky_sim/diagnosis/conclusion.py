@@ -16,8 +16,9 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import neutral_of
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, Effort
 from lg_husky_sim.diagnosis.localisation import Missing, where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
-from lg_husky_sim.diagnosis.selection.rounds import is_negligible, Round, Tried
+from lg_husky_sim.diagnosis.selection.rounds import is_negligible, Round
 from lg_husky_sim.diagnosis.selection.search import Search
+from lg_husky_sim.diagnosis.selection.ties import gains_of, is_near
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import sentence
@@ -25,7 +26,6 @@ from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import descriptions, Effect
 from lg_husky_sim.husky.network import on_side
 from lg_husky_sim.husky.parameters import Parameters
-from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 #: Parameter whose sign says to which side an effect acts: positive to the left.
@@ -125,13 +125,6 @@ def _estimate(unknown: Unknown, place: float, half: float, unit: str) -> Estimat
                     unknown.value(high))
 
 
-def _gains(base: Fit, other: Fit) -> FloatArray:
-    nu = setting('student')
-    before, after = (0.5 * (nu + 1.0) * np.log1p(f.whitened ** 2 / nu) for f in (base, other))
-    found: FloatArray = before - after
-    return found
-
-
 def rivals_of(one: Round) -> tuple[Rivalry, ...]:
     """Return what else was tried in a round, each effect once, best first."""
     best: dict[str, Rivalry] = {}
@@ -144,25 +137,6 @@ def rivals_of(one: Round) -> tuple[Rivalry, ...]:
     return tuple(sorted(best.values(), key=lambda r: -r.held_out_gain))
 
 
-def is_near(evidence: Evidence, best: Tried, other: Tried) -> bool:
-    """Return whether two names are not told apart, by the margin or Vuong's statistic."""
-    difference = best.score - other.score
-    if difference < setting('near_margin') * best.gain:
-        return True
-    gains = _gains(other.fit, best.fit)
-    blocks, place = [], 0
-    for whitener in evidence.whiteners:
-        frame = whitener.frame
-        times = frame.times[frame.order]
-        own = gains[place:place + times.size]
-        place += times.size
-        index = ((times - times[0]) / setting('block')).astype(np.int64)
-        blocks.append(np.bincount(index, weights=own))
-    sums = np.concatenate(blocks)
-    noise = float(np.std(sums)) * np.sqrt(sums.size)
-    return bool(difference < setting('near_z') * noise)
-
-
 def indistinguishable(search: Search) -> tuple[Indistinguishable, ...]:
     """Return the sets of effects between which the data do not decide."""
     found = []
@@ -170,7 +144,7 @@ def indistinguishable(search: Search) -> tuple[Indistinguishable, ...]:
         best = one.tried[0]
         near = [t for t in one.tried[1:] if t.gain > 0.0
                 and t.hypothesis.effect.id != best.hypothesis.effect.id
-                and is_near(one.evidence, best, t)]
+                and is_near(one.evidence, best.fit, t.fit, best.score - t.score, best.gain)]
         if near:
             names = tuple(dict.fromkeys([best.hypothesis.effect.id,
                                          *(t.hypothesis.effect.id for t in near)]))[:4]
@@ -196,7 +170,7 @@ def findings(search: Search) -> tuple[Finding, ...]:
         names = [p.name for p in best.hypothesis.free]
         numbers = estimates(search.final, names, search.final.point.numbers)
         onset = search.final.point.structure.onset if effect.late else None
-        regime = where_it_shows(one.evidence, _gains(one.base, best.fit))
+        regime = where_it_shows(one.evidence, gains_of(one.base, best.fit))
         side = _acting_side(effect, numbers)
         found.append(Finding(
             effect.id, side, effect.kind.subsystem.value,

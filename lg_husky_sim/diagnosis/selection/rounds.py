@@ -21,6 +21,7 @@ from lg_husky_sim.diagnosis.evidence.unknowns import loosened
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, neutral_of, Numbers
 from lg_husky_sim.diagnosis.selection.onsets import onset_looks, refined
 from lg_husky_sim.diagnosis.selection.screening import Look, look
+from lg_husky_sim.diagnosis.selection.ties import is_near
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Effect, EffectParameter
@@ -221,14 +222,16 @@ def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:
 
 
 def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[Tried]:
-    # An onset is for those that do not do as well without it, beginning from what it found.
+    # Of two that are not told apart the smaller is taken: an onset is for those that do not do
+    # as well without it, beginning from what it found.
     best = tried[0]
     if best.hypothesis.onset is None or best.hypothesis.effect.kind.needs_onset:
         return tried
     places = best.fit.point.places[:base.point.places.size]
     again = attempt(evidence, base, best.hypothesis.at(None),
                     [(base.point.at(places), numbers_of(best))])
-    if again is None or again.score < best.score:
+    if again is None or not is_near(evidence, best.fit, again.fit, best.score - again.score,
+                                    best.gain):
         return tried
     return [again, *(t for t in tried[1:] if t.hypothesis.effect != again.hypothesis.effect)]
 
