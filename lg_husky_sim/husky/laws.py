@@ -25,8 +25,9 @@ WIDTH = 24
 #: Where a row holds the voltage that its source cannot exceed [V]; 0 for none. A speed loop may
 #: ask for more than the supply has: what acts behind the driver only sees what the driver gives.
 CEILING = WIDTH - 1
-#: Laws that act on a voltage of the driver.
-OF_THE_DRIVER = (7, 8, 9, 10, 11, 12)
+#: Where the row of a law in the series to a motor holds which one: 1 or 2; 0 for one that gets
+#: the commanded voltage whatever acts before it.
+MOTOR = WIDTH - 2
 #: Length of the context vector: time, heading, x, y, angle_left, angle_right, sub-step.
 CONTEXT = 7
 #: Length of the memory vector: heat of both motors, play of both gears, what static friction
@@ -125,6 +126,14 @@ EXPRESSIONS = {
 #: Laws that depend on where the robot is, and laws that advance a memory each time they are met.
 CONTEXTUAL = (Law.HEADING, Law.WHEEL_PHASE, Law.TABLE)
 REMEMBERING = (Law.HEATING, Law.BACKLASH, Law.STICTION)
+#: Places of laws in the series from a command to a motor: dead band, largest duty cycle, the bus
+#: whose voltage the bridge chops, limit of the current, the winding behind the driver. By the
+#: law's number; 0 for a law that is not in the series.
+WINDING = 5
+PLACES = np.array([{
+    Law.DEAD_ZONE: 1, Law.DEAD_BAND: 1, Law.SOFT_BAND: 1, Law.CLIP: 2, Law.DROOP: 3,
+    Law.BUS_SAG: 3, Law.CURRENT_LIMIT: 4, Law.HEATING: WINDING}.get(law, 0) for law in Law],
+    dtype=np.int64)
 #: Names in the expressions that are signals, not parameters.
 SIGNALS = ('heading', 'angle', 'time', 'heat', 'in_play', 'table', 'held')
 
@@ -157,14 +166,55 @@ def _table(coefficients: FloatArray, c: int, j: int, argument: float) -> float:
 
 
 @jit_part
-def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int,
-                memory: FloatArray, time: float, step: float, ceiling: float) -> float:
-    # Laws of the electrical side: what the driver adds to its own voltage.
+def _given(c: int, j: int, motor: float, laws: NDArray[np.int64], coefficients: FloatArray,
+           out: FloatArray) -> float:
+    # What the driver's laws before that of effort j add to the voltage of a motor.
+    added, place = 0.0, PLACES[laws[c, j]]
+    for i in range(j if motor > 0.0 else 0):
+        if 0 < PLACES[laws[c, i]] < place and coefficients[c, i, MOTOR] == motor:
+            added += out[i]
+    return added
+
+
+@jit_part
+def _heated(c: int, j: int, motor: float, laws: NDArray[np.int64], coefficients: FloatArray,
+            out: FloatArray) -> float:
+    # What the heat of a motor's winding adds to its voltage, which a limit of its current sees.
+    added = 0.0
+    for i in range(j if motor > 0.0 else 0):
+        if laws[c, i] == 13 and coefficients[c, i, MOTOR] == motor:
+            added += out[i]
+    return added
+
+
+@jit_part
+def _summed(c: int, laws: NDArray[np.int64], coefficients: FloatArray, out: FloatArray) -> None:
+    # Move what is in series with a motor to the last of its rows. The parts of a series may cancel
+    # (a limit takes back what the bus gives), and only their sum does anything.
+    for j in range(out.size):
+        motor = coefficients[c, j, MOTOR] if PLACES[laws[c, j]] > 0 else 0.0
+        for i in range(j + 1, out.size if motor > 0.0 else 0):
+            if PLACES[laws[c, i]] > 0 and coefficients[c, i, MOTOR] == motor:
+                out[i] += out[j]
+                out[j] = 0.0
+                break
+
+
+@jit_part
+def _source_law(c: int, j: int, laws: NDArray[np.int64], coefficients: FloatArray, z: FloatArray,
+                o: int, memory: FloatArray, time: float, step: float, out: FloatArray) -> float:
+    # Laws of the electrical side: what the driver adds to the voltage that it gets.
+    law, p0, p1 = laws[c, j], coefficients[c, j, 0], coefficients[c, j, 1]
+    p2, ceiling = coefficients[c, j, 2], coefficients[c, j, CEILING]
+    motor = coefficients[c, j, MOTOR]
     own: float = z[o]
     if ceiling > 0.0:
         own = _clip(own, -ceiling, ceiling)
+    if motor > 0.0 and law != 13:
+        own += _given(c, j, motor, laws, coefficients, out)
     if law == 7:
-        return _clip(own, p2 * z[o + 1] - p1 * p0, p2 * z[o + 1] + p1 * p0) - own
+        back = p2 * z[o + 1] - _heated(c, j, motor, laws, coefficients, out)
+        return _clip(own, back - p1 * p0, back + p1 * p0) - own
     if law == 8:
         return math.copysign(max(abs(own) - p0, 0.0), own) - own
     if law == 9:
@@ -177,9 +227,10 @@ def _source_law(law: int, p0: float, p1: float, p2: float, z: FloatArray, o: int
         other: float = z[o + 1]
         if ceiling > 0.0:
             other = _clip(other, -ceiling, ceiling)
+        other += _given(c, j, 3.0 - motor, laws, coefficients, out)
         return float(-own / p1 * p0 * (own * z[o + 2] + other * z[o + 3]) / p1)
     if law == 12:
-        return -own * min(p0 * max(time, 0.0), p1)
+        return float(-own * min(p0 * max(time, 0.0), p1))
     if law == 13:
         return float(-p0 * memory[int(p2)] * own)
     rate = z[o] / p1 - z[o + 1]
@@ -195,7 +246,7 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
              offsets: NDArray[np.int64], z: FloatArray, context: FloatArray, memory: FloatArray,
              out: FloatArray) -> None:
     """
-    Evaluate every effort.
+    Evaluate every effort; what is in series with a motor stands in the order of the edits.
 
     Parameters
     ----------
@@ -210,7 +261,7 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
     context : numpy.ndarray, shape (CONTEXT,)
     memory : numpy.ndarray, shape (MEMORY,)
     out : numpy.ndarray, shape (n_efforts,)
-        Receives the efforts.
+        Receives the efforts; the last in series with a motor is the sum of them.
     """
     for j in range(out.size):
         law = laws[c, j]
@@ -254,5 +305,6 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
             selector = int(p0)
             out[j] = _table(coefficients, c, j, z[o] if selector < 0 else context[selector])
         else:
-            out[j] = _source_law(law, p0, p1, p2, z, o, memory, context[0], context[6],
-                                 coefficients[c, j, CEILING])
+            out[j] = _source_law(c, j, laws, coefficients, z, o, memory, context[0], context[6],
+                                 out)
+    _summed(c, laws, coefficients, out)

@@ -13,7 +13,7 @@ from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky import network
 from lg_husky_sim.husky.edits import branch_of, edit, EditedNetwork, stage_of
 from lg_husky_sim.husky.effects import always_on, Effect, Onset
-from lg_husky_sim.husky.laws import WIDTH
+from lg_husky_sim.husky.laws import MOTOR, WIDTH
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet, SensorModel
 from lg_husky_sim.husky.speed_loop import close_speed_loop
@@ -116,8 +116,11 @@ class Structure:
 
 @lru_cache(maxsize=256)
 def _numeric(graph: LinearGraph, outputs: tuple[str, ...]) -> NumericModel:
-    # Effects on commands and sensors leave the graph as it is: half of the catalogue.
-    return compile_numeric(graph, outputs)
+    # Effects on commands and sensors leave the graph as it is: half of the catalogue. Laws hang
+    # on others where a driver's voltages act one behind the other: these the kernel adds up.
+    series = any(name.startswith('V(E_') for branch in graph.branches
+                 if branch.characteristic is not None for name in branch.characteristic.of)
+    return compile_numeric(graph, outputs, chained=series)
 
 
 def _outputs(edited: EditedNetwork) -> tuple[str, ...]:
@@ -140,6 +143,7 @@ class _Regime:
         counts = [len(branch_of(edited.graph, name).characteristic.of)  # type: ignore[union-attr]
                   for name in self.numeric.efforts]
         self._offsets = np.cumsum([0, *counts], dtype=np.int64)[:-1]
+        self._motors = np.array([row.motor for row in rows], dtype=float)
         self._felt = np.array([row.felt for row in rows], dtype=float)
         self._volts = np.zeros((2, len(rows)))
         for j, name in enumerate(self.numeric.efforts):
@@ -151,6 +155,7 @@ class _Regime:
             values = {**values, **{name: values[own] for name, own in self._renamed.items()}}
         space: StateSpace = self.numeric.at(values)
         coefficients = np.zeros((self._laws.size, WIDTH))
+        coefficients[:, MOTOR] = self._motors
         numbers = eval(self._code, dict(GLOBALS), values)  # noqa: S307 (our own expressions)
         for place, number in zip(self._places, numbers, strict=True):
             coefficients[place] = number

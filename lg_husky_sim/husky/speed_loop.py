@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from lg_husky_sim.husky.laws import CEILING, Law, OF_THE_DRIVER, WIDTH
+from lg_husky_sim.husky.laws import CEILING, Law, PLACES, WIDTH, WINDING
 from lg_husky_sim.husky.plant import PlantSet
 import numpy as np
 
@@ -68,7 +68,8 @@ def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
     rows = np.hstack([plant.rows, np.zeros((9, 4))]) + plant.rows_u @ volts
     rows_f = np.hstack([plant.rows_f, plant.rows_u])
     inner = np.array(plant.coefficients)
-    inner[np.isin(plant.laws, OF_THE_DRIVER), CEILING] = values['supply_voltage']
+    places = PLACES[plant.laws]
+    inner[(places > 0) & (places < WINDING), CEILING] = values['supply_voltage']
     clip = np.zeros((2, WIDTH))
     clip[:, 0] = values['supply_voltage']
     return replace(

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 import enum
 import re
+from types import MappingProxyType
 
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.laws import EXPRESSIONS, Law, SIGNALS
@@ -30,11 +31,14 @@ class LawRow:
         Numbers, or expressions in the names of the parameters, in the law's order.
     felt : bool
         Whether an accelerometer feels the effort; gravity it does not.
+    motor : int
+        Number of the motor that the source is in series with; 0 for any other law.
     """
 
     law: Law
     coefficients: tuple[Coefficient, ...]
     felt: bool = True
+    motor: int = 0
 
 
 @dataclass(frozen=True)
@@ -89,14 +93,18 @@ class EditedNetwork:
         """Return this network with a modulated through-source pushing an inertia or mass."""
         return self.with_force(name, store.domain, store.tail, store.head, row, of)
 
-    def with_voltage(self, effect: str, number: str, row: LawRow, of: tuple[str, ...]
-                     ) -> EditedNetwork:
-        """Return this network with a modulated across-source in series with a motor's supply."""
+    def with_voltage(self, effect: str, number: str, row: LawRow, of: tuple[str, ...],
+                     meant: Mapping[str, str] = MappingProxyType({})) -> EditedNetwork:
+        """
+        Return this network with a modulated across-source in series with a motor's supply.
+
+        ``meant`` are expressions in the arguments that take the place of arguments of the law.
+        """
         winding = branch_of(self.graph, f'R_{number}')
-        node = f'{winding.tail}_{effect}'
+        node = f"{branch_of(self.graph, f'V_S{number}').tail}_{effect}"
         name = f'E_{effect}_{number}'
         source = Branch(name, Kind.ACROSS_SOURCE, Domain.ELECTRICAL, node, winding.tail,
-                        characteristic=_characteristic(row, of))
+                        characteristic=_characteristic(row, of, meant))
         graph = self.graph.replacing(replace(winding, tail=node)).with_branches(source)
         return replace(self, graph=graph, laws={**self.laws, name: row})
 
@@ -122,10 +130,12 @@ class EditedNetwork:
                        laws={**self.laws, name: row})
 
 
-def _characteristic(row: LawRow, of: tuple[str, ...]) -> Characteristic:
+def _characteristic(row: LawRow, of: tuple[str, ...],
+                    meant: Mapping[str, str] = MappingProxyType({})) -> Characteristic:
     texts = {f'p{i}': f'({c})' for i, c in enumerate(row.coefficients)}
-    expression = re.sub(r'\bp\d+\b', lambda match: texts[match.group()],
+    expression = re.sub(r'\bz\d+\b', lambda match: meant.get(match.group(), match.group()),
                         EXPRESSIONS[row.law])
+    expression = re.sub(r'\bp\d+\b', lambda match: texts[match.group()], expression)
     arguments = {f'z{i + 1}' for i in range(len(of))}
     parameters = tuple(n for n in names_in(expression) if n not in arguments)
     return Characteristic(expression, of, parameters,
@@ -165,11 +175,21 @@ def scrubbing(graph: LinearGraph) -> Branch:
 
 
 class Stage(enum.IntEnum):
-    """When an edit is made: laws are written with the elements and values that they find."""
+    """
+    When an edit is made: laws are written with the elements and values that they find.
+
+    Those of motors and drivers come in the order in which a law hangs on others.
+    """
 
     ELEMENTS = 0
     VALUES = 1
-    LAWS = 2
+    WINDING = 2
+    DEAD_BAND = 3
+    DUTY = 4
+    BATTERY = 5
+    CABLES = 6
+    CURRENT = 7
+    LAWS = 8
 
 
 @dataclass(frozen=True)
