@@ -76,6 +76,20 @@ class Sensors:
         """Start after a reset, without what was before; the noise goes on."""
         self._yaw = None
         self._history.clear()
+        self._factors: tuple[float, float] | None = None
+        self._turned = self._counted_before = (0.0, 0.0)
+
+    def _counted(self, turned: tuple[float, float], factors: tuple[float, float]
+                 ) -> tuple[float, float]:
+        # Encoders count what is turned: another factor does not move what was counted.
+        if self._factors is not None and factors != self._factors:
+            left, right = ((old - new) * angle for old, new, angle in zip(
+                self._factors, factors, self._turned, strict=True))
+            before = self._counted_before
+            self._counted_before = (before[0] + left, before[1] + right)
+        self._factors, self._turned = factors, turned
+        before = self._counted_before
+        return factors[0] * turned[0] + before[0], factors[1] * turned[1] + before[1]
 
     def _stale(self, delay: float) -> tuple[float, ...]:
         # The values of ``delay`` ago, linear between steps; those of now for an early stream.
@@ -116,7 +130,7 @@ class Sensors:
         accel = [inertial[5] + settings.accel_bias, inertial[6], settings.gravity]
         heading = state.pose.heading
         wheel_rates = [rates[0] * model.encoder_left, rates[1] * model.encoder_right]
-        angles = (rates[2] * model.encoder_left, rates[3] * model.encoder_right)
+        angles = self._counted((rates[2], rates[3]), (model.encoder_left, model.encoder_right))
         if settings.sensor_noise:
             noise = self._random.standard_normal(7).tolist()
             gyro += settings.gyro_stddev * noise[0]

@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 
 from lg_husky_sim.errors import SettingsError
-from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
 from lg_husky_sim.ros.engine import limited
 from lg_husky_sim.ros.settings import make_settings
@@ -192,3 +192,27 @@ def test_an_imu_that_is_early_reads_what_is_now(tmp_path: Path) -> None:
     for _ in range(60):
         reading = husky.step(BodyTwist(0.0, 0.5))
         assert reading.measured.gyro == pytest.approx(reading.twist.yaw)
+
+
+@pytest.mark.parametrize('late', [True, False])
+def test_another_encoder_factor_moves_no_angle_and_no_odometry(late: bool, tmp_path: Path) -> None:
+    """Neither at an onset nor where a model is exchanged live, after twenty turns of a wheel."""
+    model = load_model()
+    effect = Effect('encoder_scale', 'left', late=late)
+    numbers = model.parameters.with_entries(*(one.parameter() for one in effect.parameters()))
+    onset = Onset(OnsetKind.TIME, 30.0) if late else None
+    path = tmp_path / 'scaled.yaml'
+    save_model(ModelFile(replace(model.structure, effects=(effect,), onset=onset),
+                         numbers.replacing({'encoder_factor': 1.1})), path)
+    husky = LockStepHusky(command_timeout=0.0, model=str(path) if late else '')
+    for step in range(1, 1600):
+        before = husky.reading
+        if step == 1500 and not late:
+            husky.engine.configure(make_settings(command_timeout=0.0, model=str(path)))
+        now = husky.step(AHEAD)
+        turned = [new - old for new, old in zip(now.measured.wheel_angles,
+                                                before.measured.wheel_angles, strict=True)]
+        # 0.5 m/s on wheels of 0.165 m, in 20 ms.
+        assert 0.0 <= min(turned) <= max(turned) < 0.075
+        assert abs(now.wheel_twist.yaw) < 0.2
+    assert turned[0] == pytest.approx(1.1 * turned[1], rel=1e-3)
