@@ -177,6 +177,21 @@ def test_input_derivatives_are_refused_where_they_cannot_be_given() -> None:
         RightHandSide(netlist.graph, {'C_1': 1.0, 'C_2': 1.0, 'R': 1.0})
 
 
+def test_a_law_of_an_input_s_rate_of_change_is_refused() -> None:
+    """A force by the current of a capacitor across a source would need the voltage's rate."""
+    graph = LinearGraph((
+        Branch('V_s', Kind.ACROSS_SOURCE, E, 'a', 'e'),
+        Branch('C_x', Kind.A_TYPE, E, 'a', 'e', 'C'),
+        Branch('m', Kind.A_TYPE, M, 'b', 't', 'm'),
+        Branch('d', Kind.D_TYPE, M, 'b', 't', 'd'),
+        Branch('F', Kind.THROUGH_SOURCE, M, 't', 'b',
+               characteristic=Characteristic('k*z1**3', ('i(C_x)',), ('k',))),
+    ), ground={E: 'e', M: 't'})
+    with pytest.raises(GraphError, match=r"argument i\(C_x\) of a non-linear law hangs on the "
+                                         r"rate of change of input 'V_s'"):
+        compile_numeric(graph, ['v(m)'])
+
+
 @pytest.mark.parametrize(('name', 'parameters', 'z', 'value'), [
     ('coulomb', (2.0, 0.1), 0.05, 2.0 * np.tanh(0.5)),
     ('viscous_coulomb', (3.0, 2.0, 0.1), 0.05, 0.15 + 2.0 * np.tanh(0.5)),
