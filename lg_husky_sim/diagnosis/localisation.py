@@ -122,10 +122,10 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
     speeds = np.concatenate([_speeds(d, n) for d, n in zip(
         evidence.drives, counts, strict=True)])[steady]
     for balance, (row, *_) in BALANCES.items():
-        blocks, sizes = [], []
-        for place, (drive, whitener) in enumerate(zip(
-                evidence.drives, evidence.whiteners, strict=True)):
-            count = counts[place]
+        columns = np.zeros((evidence.count, sum(counts)))
+        first = top = 0
+        for count, drive, whitener in zip(
+                counts, evidence.drives, evidence.whiteners, strict=True):
             times = probe_times(drive)
             pushed = np.zeros((times.size, 4, count))
             pushed[:, row] = hats(times, drive.start, drive.end, count)
@@ -133,13 +133,8 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
             out = np.empty((frame.times.size, count))
             respond(pushed, times, frame.times, drive.channels, frame.order, frame.cosine,
                     frame.sine, whitener.model, setting('longest_step'), out)
-            blocks.append((place, whitener.apply(out)))
-            sizes.append(count)
-        columns = np.zeros((evidence.count, sum(sizes)))
-        first = top = 0
-        for size, (_, block) in zip(sizes, blocks, strict=True):
-            columns[top:top + block.shape[0], first:first + size] = block
-            first, top = first + size, top + block.shape[0]
+            columns[top:top + len(out), first:first + count] = whitener.apply(out)
+            first, top = first + count, top + len(out)
         gain, explained, values, deviations = beyond_chance(evidence, fit, projection, columns)
         if BALANCES[balance][2] == 'none':
             # Those of the wheels burst with every command that comes a little late.
@@ -148,7 +143,7 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
                 slope / np.sqrt(np.maximum(np.diag(normal), 1e-12)), speeds))
             gain, explained = max(gain, bursts), max(explained, bursts)
         first = 0
-        for size, drive in zip(sizes, evidence.drives, strict=True):
+        for size, drive in zip(counts, evidence.drives, strict=True):
             part = slice(first, first + size)
             found.append(Missing(balance, drive, np.linspace(drive.start, drive.end, size),
                                  values[part], deviations[part], gain, explained))
