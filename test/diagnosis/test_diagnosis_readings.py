@@ -15,6 +15,8 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
+from lg_husky_sim.recording.wheels import rates_from_angles
+from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -81,3 +83,29 @@ def test_jitter_loosens_a_delay_and_does_so_once(driven: Drive) -> None:
     assert loosened([loose], {'delay_pose': 0.02}) == (loose,)
     assert loosened([loose], {'delay_pose': 0.0}) == (one,)
     assert loosened([one], {'delay_imu': 0.02}) == (one,)
+
+
+@pytest.mark.parametrize('derived', [False, True])
+def test_positions_alone_are_predicted_as_counts(
+        derived: bool, drive: Callable[..., Recording]) -> None:
+    """6 ms of jitter move a count by a hundredth of a turn, and a difference by a whole rate."""
+    clean = drive('ahead', 'nothing', 1)
+    counts = clean.streams['wheel_angles']
+    logged = counts.times + np.random.default_rng(4).uniform(0.0, 0.006, len(counts))
+    streams = {name: series for name, series in clean.streams.items() if name != 'wheels'}
+    streams['wheel_angles'] = TimeSeries(logged, counts.values, counts.names)
+    middles, rates = rates_from_angles(logged, counts.values)
+    if derived:
+        streams['wheels'] = TimeSeries(middles, rates, counts.names)
+    own = drives_of([replace(clean, streams=streams)])[0]
+    assert own.counted
+    assert set(own.channels.tolist()).isdisjoint({Channel.WHEEL_LEFT, Channel.WHEEL_RIGHT})
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters.replacing(
+        {'wheel_damping': 1.3, 'yaw_damping': 14.0}))
+    error = own.measured - observe(simulate(plant, own, Reading()), own, Reading())
+    fastest = np.max(np.abs(clean.streams['wheels'].values))
+    assert np.ptp(np.diff(rates, axis=0)) > 0.5 * fastest
+    for channel in (Channel.ANGLE_LEFT, Channel.ANGLE_RIGHT):
+        assert np.ptp(own.measured[own.slice_of(channel)]) > 5.0
+        assert np.max(np.abs(error[own.slice_of(channel)])) < 0.006 * fastest
