@@ -28,8 +28,8 @@ def main() -> None:
     odometry, truth = (odometry_message(settings, truth=flag) for flag in (False, True))
     joints = joint_state_message(settings)
     joints.position = joints.velocity = joints.effort = [0.0] * 4
-    imu, tf, battery = (imu_message(settings), transform_message(settings),
-                        battery_message(settings))
+    imu, battery = imu_message(settings), battery_message(settings)
+    tf = transform_message(settings.odom_frame, settings.base_frame)
     stamps = [m.header.stamp for m in (odometry, truth, joints, imu, battery)]
     stamps.append(tf.transforms[0].header.stamp)
     rows: list[tuple[Any, Any]] = [
