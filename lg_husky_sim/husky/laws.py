@@ -263,6 +263,7 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
     out : numpy.ndarray, shape (n_efforts,)
         Receives the efforts; the last in series with a motor is the sum of them.
     """
+    in_series = 0
     for j in range(out.size):
         law = laws[c, j]
         p0, p1 = coefficients[c, j, 0], coefficients[c, j, 1]
@@ -307,4 +308,7 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
         else:
             out[j] = _source_law(c, j, laws, coefficients, z, o, memory, context[0], context[6],
                                  out)
-    _summed(c, laws, coefficients, out)
+            if coefficients[c, j, MOTOR] > 0.0:
+                in_series += 1
+    if in_series > 2:  # more than one effect of both motors
+        _summed(c, laws, coefficients, out)
