@@ -10,6 +10,8 @@ the variance ``c' c`` of white ones.
 
 from __future__ import annotations
 
+import itertools
+
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
@@ -34,10 +36,10 @@ def dispersion(evidence: Evidence, whitened: FloatArray, columns: FloatArray) ->
         At least what Student's t makes of white innovations.
     """
     nu = setting('student')
-    scores = columns * (whitened * (nu + 1.0) / (nu + whitened ** 2))[:, None]
-    sums = _over_blocks(evidence, scores, setting('block'))
+    scores = whitened * (nu + 1.0) / (nu + whitened ** 2)
+    sums = np.array([scores[part] @ columns[part] for part in _blocks(evidence, setting('block'))])
     meat = sums.T @ sums
-    scale = np.sqrt(np.maximum(np.sum(columns ** 2, axis=0), 1e-300))
+    scale = np.sqrt(np.maximum(np.einsum('ij,ij->j', columns, columns), 1e-300))
     bread = columns.T @ columns / np.outer(scale, scale)
     ratio = np.trace(np.linalg.pinv(bread, rcond=1e-9) @ (meat / np.outer(scale, scale)))
     found: float = max(setting('inflation'), float(ratio) / columns.shape[1])
@@ -61,17 +63,18 @@ def accident(evidence: Evidence, before: FloatArray, after: FloatArray) -> float
     """
     nu = setting('student')
     gains = 0.5 * (nu + 1.0) * (np.log1p(before ** 2 / nu) - np.log1p(after ** 2 / nu))
-    return max(0.0, float(np.max(_over_blocks(evidence, gains, setting('accident')))))
+    return max(0.0, *(float(np.sum(gains[part])) for part in _blocks(
+        evidence, setting('accident'))))
 
 
-def _over_blocks(evidence: Evidence, values: FloatArray, length: float) -> FloatArray:
-    # Sums over stretches of so many seconds of each drive.
+def _blocks(evidence: Evidence, length: float) -> list[slice]:
+    # Stretches of so many seconds of each drive.
     found, place = [], 0
     for whitener in evidence.whiteners:
         frame = whitener.frame
         times = frame.times[frame.order]
         block = ((times - times[0]) / length).astype(np.int64)
-        starts = np.flatnonzero(np.diff(block, prepend=-1))
-        found.append(np.add.reduceat(values[place:place + times.size], starts, axis=0))
+        edges = place + np.append(np.flatnonzero(np.diff(block, prepend=-1)), times.size)
+        found += [slice(int(first), int(last)) for first, last in itertools.pairwise(edges)]
         place += times.size
-    return np.concatenate(found)
+    return found

@@ -26,6 +26,9 @@ from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
+#: Numbers in the columns of the onsets that are looked at together: a matter of memory alone.
+BATCH = 4_000_000
+
 
 def onsets_of(evidence: Evidence) -> list[Onset]:
     """Return where an effect may begin, on a coarse grid of times and places."""
@@ -87,16 +90,20 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
             groups = [[{**groups[0][0], **known[hypothesis.label]}]]
         best: Look | None = None
         for group in groups:
-            columns = _columns(evidence, base, motions, patterns, hypothesis, group)
-            if columns is None:
+            changes = _changes(evidence, base, motions, hypothesis, group)
+            if changes is None:
                 continue
             limits = limits_of(hypothesis, group)
-            for onset, normal, slope in zip(onsets, *projection.problems(columns, len(group)),
-                                            strict=True):
-                gain, coefficients = gain_of(normal, slope, limits)
-                if gain > (0.0 if best is None else best.gain):
-                    at = hypothesis.at(onset)
-                    best = Look(at, begin(at, group, coefficients), gain)
+            width = max(1, BATCH // (evidence.count * len(group)))
+            for first in range(0, len(onsets), width):
+                some = slice(first, first + width)
+                columns = _columns(evidence, changes, [on[:, some] for on in patterns])
+                for onset, normal, slope in zip(
+                        onsets[some], *projection.problems(columns, len(group)), strict=True):
+                    gain, coefficients = gain_of(normal, slope, limits)
+                    if gain > (0.0 if best is None else best.gain):
+                        at = hypothesis.at(onset)
+                        best = Look(at, begin(at, group, coefficients), gain)
         return best
     open_ones = [h for h in pool if not h.effect.kind.always_on and h.effect.shape != 'grip']
     return [one for one in evidence.pool.map(best_of, open_ones) if one is not None]
@@ -123,10 +130,9 @@ def _patterns(evidence: Evidence, drive: Drive, motion: Motion, times: FloatArra
     return found
 
 
-def _columns(evidence: Evidence, base: Fit, motions: Sequence[Motion],
-             patterns: Sequence[np.typing.NDArray[np.uint8]], hypothesis: Hypothesis,
-             group: Sequence[Numbers]) -> FloatArray | None:
-    # Whitened changes, shape (n, numbers * onsets).
+def _changes(evidence: Evidence, base: Fit, motions: Sequence[Motion], hypothesis: Hypothesis,
+             group: Sequence[Numbers]) -> list[list[tuple[FloatArray, FloatArray]]] | None:
+    # Of each number and drive, the change of the readings and what has built up at each of them.
     found = []
     for numbers in group:
         try:
@@ -135,16 +141,29 @@ def _columns(evidence: Evidence, base: Fit, motions: Sequence[Motion],
         except LgHuskyError:
             return None
         parts = []
-        for drive, motion, before, whitener, on, old in zip(
-                evidence.drives, moved, motions, evidence.whiteners, patterns, base.predicted,
-                strict=True):
+        for drive, motion, before, whitener, old in zip(
+                evidence.drives, moved, motions, evidence.whiteners, base.predicted, strict=True):
             change = observe(motion, drive, point.log) - old
             if not np.all(np.isfinite(change)):
                 return None
-            parts.append(whitener.switched(change, _built_up(
-                drive, motion, before, change, whitener.frame), on))
-        found.append(np.concatenate(parts))
-    return np.hstack(found)
+            parts.append((change, _built_up(drive, motion, before, change, whitener.frame)))
+        found.append(parts)
+    return found
+
+
+def _columns(evidence: Evidence, changes: Sequence[Sequence[tuple[FloatArray, FloatArray]]],
+             patterns: Sequence[np.typing.NDArray[np.uint8]]) -> FloatArray:
+    # Whitened changes, shape (n, numbers * onsets).
+    width = patterns[0].shape[1]
+    columns = np.empty((evidence.count, len(changes) * width))
+    for number, parts in enumerate(changes):
+        top = 0
+        for (change, built_up), whitener, on in zip(
+                parts, evidence.whiteners, patterns, strict=True):
+            columns[top:top + len(on), number * width:(number + 1) * width] = whitener.switched(
+                change, built_up, np.ascontiguousarray(on))
+            top += len(on)
+    return columns
 
 
 def _built_up(drive: Drive, motion: Motion, before: Motion, change: FloatArray, frame: Frame

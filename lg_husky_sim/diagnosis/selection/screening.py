@@ -48,6 +48,14 @@ class Look:
     gain: float
 
 
+#: Rows of columns that are worked on together: a matter of memory alone.
+ROWS = 8192
+
+
+def _slices(count: int) -> list[slice]:
+    return [slice(first, first + ROWS) for first in range(0, count, ROWS)]
+
+
 class Projection:
     """
     What is left of whitened columns when the numbers of the base may move.
@@ -85,13 +93,16 @@ class Projection:
         slope : numpy.ndarray, shape (m,)
         """
         explained = self._base @ columns
-        normal = columns.T @ (columns * self._weights[:, None]) - explained.T @ explained
+        normal = -explained.T @ explained
+        for some in _slices(len(columns)):
+            normal += columns[some].T @ (columns[some] * self._weights[some, None])
         return normal, self._target @ columns
 
     def apart(self, columns: FloatArray) -> FloatArray:
         """Return what is left of the columns themselves, shape (n, m)."""
-        found: FloatArray = columns - (self._base.T / self._weights[:, None]) @ (
-            self._base @ columns)
+        explained, found = self._base @ columns, np.array(columns)
+        for some in _slices(len(columns)):
+            found[some] -= (self._base.T[some] / self._weights[some, None]) @ explained
         return found
 
     def problems(self, columns: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
