@@ -16,7 +16,7 @@ import tempfile
 import time
 from typing import Any
 
-from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.errors import MissingExtraError, SettingsError
 from lg_husky_sim.ros import api
 
 #: Domains that are tried; higher ones reach into the ports that Linux hands out by itself.
@@ -134,6 +134,14 @@ class NodeProcess:
             return self.process.wait()
 
 
+def _installed(kind: str, topic: str) -> Any:
+    """Return a message class; refuse one whose package is not installed."""
+    if (found := api.message_type(kind)) is None:
+        raise MissingExtraError(f'{topic}: message package {kind.partition("/")[0]} is needed for '
+                                f'{kind} and is not installed')
+    return found
+
+
 class Probe:
     """
     A node in the test's process that listens and talks; needs :func:`api.init` before.
@@ -153,12 +161,12 @@ class Probe:
     def listen(self, kind: str, topic: str, qos: Any = 50) -> list[Any]:
         """Return a list that grows with each message of a topic while the probe spins."""
         received: list[Any] = []
-        self.node.create_subscription(api.message_type(kind), topic, received.append, qos)
+        self.node.create_subscription(_installed(kind, topic), topic, received.append, qos)
         return received
 
     def talk(self, kind: str, topic: str, qos: Any = 10) -> tuple[Any, Any]:
         """Return a publisher and the class of its messages."""
-        message = api.message_type(kind)
+        message = _installed(kind, topic)
         return self.node.create_publisher(message, topic, qos), message
 
     def spin(self, seconds: float) -> None:
