@@ -140,8 +140,13 @@ def test_clock_and_identical_trajectory_at_every_speed(probe: Probe, start: Star
         pause.publish(boolean(data=True))
         probe.spin(0.2)
         joints.clear()
-        reset.publish(boolean(data=True))
-        assert probe.until(lambda: joints and stamp(joints[-1]) == 0)
+
+        def rewound() -> bool:
+            # Again: the one message of a reset is lost where our reader is not matched yet.
+            reset.publish(boolean(data=True))
+            probe.spin(0.1)
+            return bool(joints and stamp(joints[-1]) == 0)
+        assert probe.until(rewound)
         # At first the stamp is 0 anyway: a reset that came after the command would undo it.
         probe.spin(0.5)
         message = kind()

@@ -132,8 +132,9 @@ def test_a_recorder_is_no_robot_and_another_type_is_named(probe: Probe, tmp_path
         driver.close()
         tool.close()
     stamped = probe.listen('geometry_msgs/msg/TwistStamped', '/c/cmd_vel')
-    # From a process of its own: Fast DDS knows a topic of one type only in each.
-    other = run('drive', 'circle', '--topic', '/c/cmd_vel', '--namespace', '/', '--wait', '2')
+    # From a process of its own: Fast DDS knows a topic of one type only in each, and takes up to
+    # 2 s on an idle machine to tell one process of another's ends.
+    other = run('drive', 'circle', '--topic', '/c/cmd_vel', '--namespace', '/', '--wait', '6')
     assert probe.until(lambda: other.poll() is not None, 60.0)
     _, said = other.communicate()
     assert other.returncode == 1
