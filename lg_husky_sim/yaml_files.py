@@ -102,8 +102,28 @@ def brief(error: Exception) -> str:
     return re.sub(r'\S{120,}', lambda match: f'{match.group()[:57]}...', str(error))
 
 
-def _refuse_bombs(text: str) -> None:
-    """Refuse what is deep, long or endless, by its events, before anything is made of it."""
+def refuse_bombs(text: str, most: int = MOST_NODES) -> int:
+    """
+    Refuse what is deep, long or endless, by its events, before anything is made of it.
+
+    Parameters
+    ----------
+    text : str
+        YAML that this or another library is to read.
+    most : int
+        Values and keys that are allowed, each reference counted as all that it refers to.
+
+    Returns
+    -------
+    int
+        How many there are.
+
+    Raises
+    ------
+    yaml.YAMLError
+        In one line.
+
+    """
     aliases = 0
     sizes: dict[str, int] = {}
     # Of what is open: anchor, and nodes so far; at the bottom, all of the file.
@@ -132,8 +152,9 @@ def _refuse_bombs(text: str) -> None:
             raise yaml.YAMLError(f'nested deeper than {DEEPEST} levels')
         if aliases > MOST_ALIASES:
             raise yaml.YAMLError(f'more than {MOST_ALIASES} aliases')
-        if inside[-1][1] > MOST_NODES:
-            raise yaml.YAMLError(f'more than {MOST_NODES} values')
+        if inside[-1][1] > most:
+            raise yaml.YAMLError(f'more than {most} values')
+    return inside[0][1]
 
 
 def shown(value: object) -> str:
@@ -170,7 +191,7 @@ def parse_yaml(text: str) -> object:
 
     """
     try:
-        _refuse_bombs(text)
+        refuse_bombs(text)
         return yaml.load(text, _Loader)  # noqa: S506 (a subclass of the safe loader)
     except (yaml.YAMLError, ValueError, TypeError, AttributeError, KeyError,
             OverflowError) as error:

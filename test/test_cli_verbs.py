@@ -18,6 +18,7 @@ from click.testing import CliRunner
 import lg_husky_sim as lg
 from lg_husky_sim.cli import main
 from lg_husky_sim.cli.common import BRIEF, Output, rich_table
+from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.husky.effects import catalogue
 from lg_husky_sim.manoeuvres import builtin_manoeuvres
 import pytest
@@ -188,3 +189,10 @@ def test_derive_prints_numbers_and_exports_them(tmp_path: Path) -> None:
     assert 'With the numbers of the model' in said.stdout
     assert '-2090.91' in said.stdout
     assert json.loads(path.read_text('utf-8')) == json.loads(run('derive', '--json').stdout)
+
+
+def test_a_diagnosis_without_end_is_refused(tmp_path: Path) -> None:
+    """The reader of JSON calls itself for each bracket."""
+    (tmp_path / 'diagnosis.json').write_text('[' * 100_000, encoding='utf-8')
+    with pytest.raises(SettingsError, match='is not a diagnosis: maximum recursion'):
+        run('plan-drive', str(tmp_path), '--out', str(tmp_path / 'drive.yaml'))

@@ -98,7 +98,7 @@ def _from_folder(folder: Path) -> tuple[Rival, Rival]:
         finding = data['findings'][0] if data['findings'] else None
         rivals = [(str(r['effect']), str(r['side'])) for r in finding['rivals']] if finding else []
         name = str(finding['effect']) if finding else ''
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise SettingsError(f'{place} is not a diagnosis: {error}') from error
     rivals = [(effect, side) for effect, side in rivals if effect != name]
     if not finding or name == 'unknown' or not rivals:

@@ -16,6 +16,7 @@ from lg_husky_sim.extras import require
 from lg_husky_sim.recording.rosbag2 import available, Rosbag2
 from lg_husky_sim.recording.salvage import is_cut_off, salvage
 from lg_husky_sim.recording.topics import Topic
+from lg_husky_sim.recording.unpacking import BeyondLimitError, bounded
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
@@ -98,10 +99,12 @@ def open_bag(path: Path) -> Iterator[Bag | Rosbag2]:
             from rosbags.highlevel import AnyReader
             from rosbags.typesys import get_typestore, Stores
             reader = AnyReader(whole, default_typestore=get_typestore(Stores.ROS2_JAZZY))
-            with reader:
+            with bounded(reader):
                 yield Bag(reader, notes)
     except LgHuskyError:
         raise
+    except BeyondLimitError as error:
+        raise RecordingError(f'cannot read {path}: {error}') from error
     except Exception as error:  # damaged bytes raise anything in the decoders below
         raise RecordingError(f'cannot read {path}: {_reason(error)}{_advice(files)}') from error
 

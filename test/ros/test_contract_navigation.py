@@ -54,8 +54,10 @@ class Graph:
             heard.clear()
         self.husky = start(**{'publish_clock': True, 'publish_map_tf': True, **parameters})
         self.husky.ready(self.truth)
+        # Each end is found by itself, on Fast DDS seconds apart; tf may come long after the truth.
         assert probe.until(lambda: self.pose.get_subscription_count() > 0
-                           and self.command.get_subscription_count() > 0)
+                           and self.command.get_subscription_count() > 0
+                           and self.transform('odom', 'base_link') is not None)
 
     def transform(self, parent: str, child: str) -> tuple[Pose, int] | None:
         """Return the last transform between two frames and its stamp [ns]."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 import re
+import tracemalloc
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.ros.occupancy import OccupancyMap, read_map
@@ -116,7 +117,9 @@ def test_modes_of_map_server(tmp_path: Path, more: str, cells: list[list[int]]) 
     (b'P5 1 1 255\n\0', HEAD + 'free_thresh: 0.7\n', 'free_thresh = 0.7 is not below'),
     (b'P5 1 1 255\n\0', HEAD.replace('[-1.0', '[1' + '0' * 400), 'int too large'),
     (b'P5 1 1 255\n\0', HEAD.replace('map.pgm', '"\\0"'), 'null'),
-    (b'P5 999999 999999 255\n\0', HEAD, 'cannot be used')])
+    (b'P5 999999 999999 255\n\0', HEAD, 'cannot be used; at most 40000000 pixels'),
+    (b'P2 4001 4001 255\n0', HEAD, 'cannot be used; at most 16000000 pixels'),
+    (b'P5 1 1 65536\n\0', HEAD, '1 × 1 pixels of 0 to 65536 cannot be used')])
 def test_a_file_that_cannot_be_used_is_refused_in_one_line(
         tmp_path: Path, image: bytes, text: str, message: str) -> None:
     """Name of the file and reason."""
@@ -125,6 +128,26 @@ def test_a_file_that_cannot_be_used_is_refused_in_one_line(
         read_map(path, 60)
     assert str(caught.value).startswith(f'map_file = {path!r} cannot be used: ')
     assert '\n' not in str(caught.value)
+
+
+def test_only_what_an_image_announces_is_read(tmp_path: Path) -> None:
+    """Not the gigabytes behind it, nor spaces without end before its sizes."""
+    path = written(tmp_path, b'P5 3 2 255\n' + bytes([0, 254, 205, 254, 254, 0]))
+    cells = read_map(path, 60).cells
+    with (tmp_path / 'map.pgm').open('r+b') as file:
+        file.truncate(10**9)
+    (tmp_path / 'blank.pgm').write_bytes(b'P5' + b' ' * 10**7)
+    tracemalloc.start()
+    try:
+        np.testing.assert_array_equal(read_map(path, 60).cells, cells)
+        (tmp_path / 'map.yaml').write_text(
+            HEAD.replace('map.pgm', 'blank.pgm') + THRESHOLDS, encoding='utf-8')
+        with pytest.raises(SettingsError, match='is no PGM image'):
+            read_map(path, 60)
+        # 10 MB for the search of the first 64 kB, 150 times that for all.
+        assert tracemalloc.get_traced_memory()[1] < 2e7
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
