@@ -43,6 +43,17 @@ def _plain(value: object) -> object:
     return list(value) if isinstance(value, tuple) else value
 
 
+def given_settings(node: Node) -> dict[str, object]:
+    """Return what command line and files give of the settings; warn of what is none."""
+    given = {name: parameter.value for name, parameter in parameter_overrides(node).items()
+             if name not in _OF_ROS}
+    for name in sorted(set(given) - set(BY_NAME)):
+        node.get_logger().warning(
+            'qos_overrides have no effect: the quality of service is fixed (docs/ros.md)'
+            if name.startswith('qos_overrides.') else f'{unknown(name)}; it is ignored')
+    return {name: value for name, value in given.items() if name in BY_NAME}
+
+
 def declare_settings(node: Node) -> Settings:
     """
     Declare every setting on a node and return their values.
@@ -66,13 +77,7 @@ def declare_settings(node: Node) -> Settings:
         If a value is not allowed.
 
     """
-    given = {name: parameter.value for name, parameter in parameter_overrides(node).items()
-             if name not in _OF_ROS}
-    for name in sorted(set(given) - set(BY_NAME)):
-        node.get_logger().warning(
-            'qos_overrides have no effect: the quality of service is fixed (docs/ros.md)'
-            if name.startswith('qos_overrides.') else f'{unknown(name)}; it is ignored')
-    settings = make_settings({name: value for name, value in given.items() if name in BY_NAME})
+    settings = make_settings(given_settings(node))
     for setting in TABLE:
         value = _plain(getattr(settings, setting.name))
         node.declare_parameter(setting.name, value, _descriptor(setting), ignore_override=True)

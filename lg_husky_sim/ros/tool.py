@@ -15,12 +15,17 @@ from typing import Any
 from lg_husky_sim.errors import CommandError, SettingsError
 from lg_husky_sim.ros import api
 from lg_husky_sim.ros.graph import find_robots, Robot, the_one
+from lg_husky_sim.ros.parameters import given_settings
 from lg_husky_sim.ros.settings import BY_NAME, DEFAULT_PRESET, make_settings, Settings
 
 #: Longest stay in one wait [s]; constant, for rclpy forgets who is ready when it changes.
 WAIT = 0.01
 #: Time between two looks at who is in the graph [s].
 LOOK = 0.1
+#: Longest time between the first and the last robot that are told of [s]. Fast DDS announces a
+#: process every 3 s (its `leaseAnnouncement`): of three robots that were there, one was told of at
+#: once and the others after 2 s. Cyclone tells of all at once.
+OTHERS = 3.5
 _ENDS = ('SIGINT', 'SIGTERM', 'SIGHUP')
 
 
@@ -153,11 +158,9 @@ class Tool:
         """
         Return the settings of the robot, with what ``-p`` gives over what the caller gives.
 
-        Parameters of other nodes are none of ours, as everywhere in ROS.
+        Parameters of other nodes are none of ours, as everywhere in ROS; a warning names them.
         """
-        own = {name: one.value for name, one in api.parameter_overrides(self.node).items()
-               if name in BY_NAME}
-        return make_settings({**given, **own})
+        return make_settings({**given, **given_settings(self.node)})
 
     def close(self) -> None:
         """Leave the graph."""
@@ -206,7 +209,7 @@ def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wai
     preset, namespace : str, optional
         Look for these only.
     wait : float
-        How long to look [s]; once one is seen, a second longer for others.
+        How long to look for the first [s]; for others, :data:`OTHERS` longer.
 
     Returns
     -------
@@ -222,13 +225,13 @@ def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wai
     tool = Tool('lg_husky_look', orderly)
     try:
         end = time.monotonic() + wait
-        seen = None
+        seen = False
         while True:
             topics = dict(tool.node.get_topic_names_and_types())
             robot = the_one(find_robots(topics, preset=preset, namespace=namespace))
-            if robot is not None and seen is None:
-                seen = time.monotonic()
-                end = seen + min(1.0, wait)
+            if robot is not None and not seen:
+                seen = True
+                end = time.monotonic() + OTHERS
             if time.monotonic() >= end:
                 return robot
             until = time.monotonic() + LOOK
@@ -271,7 +274,7 @@ def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = N
     place = namespace or remapped or os.environ.get('ROS_NAMESPACE') or None
     if preset is None or place is None:
         robot = look_for(orderly, preset=preset, namespace=place, wait=wait if preset is None
-                         else min(wait, 1.0))
+                         else min(wait, OTHERS))
         if robot is not None:
             preset, place = robot.preset, place or robot.namespace
         elif preset is None:

@@ -18,9 +18,9 @@ from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.ros import api, commands
 from lg_husky_sim.ros.commands import ZEROS
 from lg_husky_sim.ros.driver import drive
-from lg_husky_sim.ros.graph import Endpoint, find_robots, the_one
+from lg_husky_sim.ros.graph import Endpoint, find_robots, Robot, the_one
 from lg_husky_sim.ros.settings import make_settings
-from lg_husky_sim.ros.tool import Ended, Orderly, Tool
+from lg_husky_sim.ros.tool import choose, Ended, Orderly, Tool
 from lg_husky_sim.testing.live import LiveHusky, Probe, probed_domain
 import pytest
 
@@ -244,6 +244,28 @@ def test_a_namespaced_robot_is_found_recorded_and_named_if_there_are_two(
     assert '/a200_0000/platform/cmd_vel moves' in said
     assert 'at most 0.1 m/s' in said
     assert max(message.twist.linear.x for message in told) <= 0.1
+
+
+@pytest.mark.parametrize('preset', [None, 'clearpath_jazzy'])
+def test_a_second_robot_that_is_told_of_later_is_waited_for(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch, preset: str | None) -> None:
+    """Fast DDS told of one of three robots 2 s before the others: a tool served that one."""
+    robots = [Robot('/a200_0000', 'clearpath_jazzy', 4), Robot('/a200_0001', 'clearpath_jazzy', 4)]
+    begun = time.monotonic()
+    monkeypatch.setattr('lg_husky_sim.ros.tool.find_robots', lambda topics, **only: tuple(
+        robots[:1 if time.monotonic() < begun + 2.5 else 2]))
+    with Orderly() as orderly, pytest.raises(SettingsError, match='2 Huskies are in the graph'):
+        choose(orderly, (), preset=preset)
+
+
+def test_an_unknown_parameter_of_a_tool_is_named(probe: Probe, tmp_path: Path) -> None:
+    """What is misspelt would be recorded without; parameters of other nodes end nothing."""
+    spoken = run('record', tmp_path / 'bag', '--preset', 'paper', '--namespace', '/nobody',
+                 '--seconds', '0.5', '--ros-args', '-p', 'imu_topics:=/x', '-p',
+                 'use_sim_time:=false')
+    out, said = spoken.communicate(timeout=120.0)
+    assert (out + said).count('is ignored') == 1
+    assert 'parameter imu_topics is unknown; did you mean imu_topic?; it is ignored' in out + said
 
 
 def test_a_tool_without_a_robot_says_so(probe: Probe, tmp_path: Path) -> None:
