@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import itertools
+import os
 from pathlib import Path
 import time
 from typing import Any
@@ -33,7 +34,8 @@ def test_the_robot_goes_on_when_the_system_clock_jumps(
     topic = f'/clock_{"ahead" if jump > 0 else "back"}'
     truth = probe.listen('nav_msgs/msg/Odometry', topic, 1000)
     husky = start(ground_truth_topic=topic, rate=10.0, environment={
-        'LD_PRELOAD': str(LIBRARY), 'FAKETIME_TIMESTAMP_FILE': str(offset),
+        'LD_PRELOAD': ' '.join([str(LIBRARY), *os.environ.get('LD_PRELOAD', '').split()]),
+        'FAKETIME_TIMESTAMP_FILE': str(offset),
         'FAKETIME_NO_CACHE': '1', 'FAKETIME_DONT_FAKE_MONOTONIC': '1'})
     husky.ready(truth, 60.0)
     # The first one comes before there is a timer.
