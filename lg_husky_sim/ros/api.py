@@ -198,6 +198,14 @@ def leave(node: Node) -> None:
         node.context.stop()
 
 
+def reason(error: Exception) -> str:
+    """Return a user's mistake in one line, also where rclpy says only what it does not know."""
+    text = ' '.join(str(error).split())
+    if type(error).__name__ == 'UnknownROSArgsError':
+        return f'unknown ROS argument {text.strip("[]")}'
+    return text
+
+
 def describe_backend(environment: Mapping[str, str] = os.environ) -> str:
     """Return backend, domain and discovery range in a line, for the first log message."""
     if HAVE_RCLPY:
@@ -238,6 +246,7 @@ __all__ = [
     'parameter',
     'parameter_overrides',
     'qos_profile_sensor_data',
+    'reason',
     'serialised',
     'service_type',
     'services_work',

@@ -10,7 +10,7 @@ from typing import Any
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.ros import api
-from lg_husky_sim.ros.commands import Commands, Say
+from lg_husky_sim.ros.commands import Commands, NAMES, Say
 from lg_husky_sim.ros.conversions import (
     fill_odometry,
     imu_message,
@@ -18,7 +18,7 @@ from lg_husky_sim.ros.conversions import (
     odometry_message,
     set_stamp,
 )
-from lg_husky_sim.ros.graph import publishers
+from lg_husky_sim.ros.graph import Endpoint, publishers
 from lg_husky_sim.ros.settings import Settings
 from lg_husky_sim.ros.tool import Tool
 from lg_husky_sim.signals import BodyTwist, Pose, TimeSeries
@@ -40,7 +40,6 @@ class _Stream:
                      odometry_message(settings, truth=False)),
         }[name]
         self.topic = node.resolve_topic_name(topic)
-        self.others = publishers(node, topic)
         self.publisher = node.create_publisher(api.message_type(kind), topic, 10)
 
     def send(self, row: Any, nanoseconds: int) -> None:
@@ -106,7 +105,7 @@ def play(tool: Tool, streams: Mapping[str, TimeSeries], settings: Settings, *,
             if time.monotonic() > end:
                 raise RecordingError(f'nobody listens to any of the topics after {wait:g} s')
         commands.settle()
-        _say_who(commands, senders, told, say)
+        _say_who(tool, commands, senders, told, say)
         tool.wait_for_time(wait)
         times = np.concatenate([streams[name].times for name in names])
         which = np.repeat(np.arange(len(names)), [len(streams[name]) for name in names])
@@ -127,14 +126,29 @@ def play(tool: Tool, streams: Mapping[str, TimeSeries], settings: Settings, *,
     return int(order.size)
 
 
-def _say_who(commands: Commands, senders: Mapping[str, _Stream], told: bool, say: Say) -> None:
+def _others(tool: Tool, senders: Mapping[str, _Stream]) -> dict[str, tuple[Endpoint, ...]]:
+    """Return who else publishes each topic, once they are known by name or that took too long."""
+    own = tool.node.get_fully_qualified_name()
+    end = time.monotonic() + NAMES
+    while True:
+        found = {sender.topic: tuple(one for one in publishers(tool.node, sender.topic)
+                                     if one.node != own) for sender in senders.values()}
+        if time.monotonic() > end or all(
+                one.is_named for others in found.values() for one in others):
+            return found
+        tool.serve()
+
+
+def _say_who(tool: Tool, commands: Commands, senders: Mapping[str, _Stream], told: bool, say: Say
+             ) -> None:
     robots = commands.robots() if told else ()
     if robots:
         commands.wait(0.0, say)
     else:
         say('no command goes out that moves a robot' if not told else
             f'no robot listens to {commands.topic}')
-    for sender in senders.values():
-        if sender.others:
-            say(f'{sender.topic} is published by {sender.others[0].node} as well: who listens '
-                'gets both')
+    for topic, others in _others(tool, senders).items():
+        if others:
+            known = [one.node for one in others if one.is_named]
+            say(f'{topic} is published by {known[0] if known else "another node"} as well: who '
+                'listens gets both')

@@ -97,7 +97,7 @@ def _run(args: Sequence[str] | None) -> int:
         if not joined or api.ok():
             if not isinstance(error, api.USER_ERRORS):
                 raise
-            print(f'error: {" ".join(str(error).split())}', file=sys.stderr)
+            print(f'error: {api.reason(error)}', file=sys.stderr)
             code = 1
     finally:
         _on_signals(signal.SIG_IGN)

@@ -193,7 +193,7 @@ def joined(arguments: Sequence[str] = ()) -> Iterator[Orderly]:
             api.join(['lg_husky', '--ros-args', *arguments])
             yield orderly
         except api.ROS_ERRORS as error:
-            raise SettingsError(' '.join(str(error).split())) from error
+            raise SettingsError(api.reason(error)) from error
         finally:
             api.try_shutdown()
 

@@ -19,9 +19,12 @@ from lg_husky_sim.ros import api, commands
 from lg_husky_sim.ros.commands import ZEROS
 from lg_husky_sim.ros.driver import drive
 from lg_husky_sim.ros.graph import Endpoint, find_robots, Robot, the_one
+from lg_husky_sim.ros.player import play
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.ros.tool import choose, Ended, Orderly, Tool
+from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.testing.live import LiveHusky, Probe, probed_domain
+import numpy as np
 import pytest
 
 FAST = Manoeuvre('fast', (Step(20.0, 3.0, -4.0),))
@@ -256,6 +259,26 @@ def test_a_second_robot_that_is_told_of_later_is_waited_for(
         robots[:1 if time.monotonic() < begun + 2.5 else 2]))
     with Orderly() as orderly, pytest.raises(SettingsError, match='2 Huskies are in the graph'):
         choose(orderly, (), preset=preset)
+
+
+@pytest.mark.parametrize(('later', 'name'), [(0.5, '/rover'), (99.0, 'another node')])
+def test_playing_names_who_else_publishes(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch, later: float, name: str) -> None:
+    """Fast DDS tells of a publisher before it tells whose it is; ours is no other."""
+    probe.listen('sensor_msgs/msg/JointState', '/joint_states')
+    tool = Tool('lg_husky_player', Orderly())
+    begun, said, kind = time.monotonic(), list[str](), 'sensor_msgs/msg/JointState'
+
+    def publishers(node: api.Node, topic: str) -> tuple[Endpoint, ...]:
+        shown = '/rover' if time.monotonic() > begun + later else '/_NODE_NAME_UNKNOWN_'
+        return tuple(Endpoint(one, kind, True, False) for one in ('/lg_husky_player', shown))
+    monkeypatch.setattr('lg_husky_sim.ros.player.publishers', publishers)
+    try:
+        play(tool, {'wheels': TimeSeries(np.array([0.0, 0.01]), np.zeros((2, 2)),
+                                         ('left', 'right'))}, make_settings(), say=said.append)
+    finally:
+        tool.close()
+    assert said[-1] == f'/joint_states is published by {name} as well: who listens gets both'
 
 
 def test_an_unknown_parameter_of_a_tool_is_named(probe: Probe, tmp_path: Path) -> None:
