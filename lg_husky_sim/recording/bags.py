@@ -16,7 +16,7 @@ from lg_husky_sim.extras import require
 from lg_husky_sim.recording.rosbag2 import available, Rosbag2
 from lg_husky_sim.recording.salvage import is_cut_off, salvage
 from lg_husky_sim.recording.topics import Topic
-from lg_husky_sim.recording.unpacking import BeyondLimitError, bounded
+from lg_husky_sim.recording.unpacking import BeyondLimitError, bounded, refuse_large_chunks
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
@@ -94,6 +94,9 @@ def open_bag(path: Path) -> Iterator[Bag | Rosbag2]:
         with tempfile.TemporaryDirectory(prefix='lg_husky_') as scratch:
             whole, notes = _repaired(files, Path(scratch))
             if by_ros:
+                for part in _parts(whole):
+                    if part.suffix == '.mcap':
+                        refuse_large_chunks(part)
                 yield Rosbag2(whole, notes)
                 return
             from rosbags.highlevel import AnyReader
@@ -160,9 +163,14 @@ def _files(path: Path) -> list[Path]:
     return [path]
 
 
+def _parts(files: list[Path]) -> list[Path]:
+    """Return the files that are meant, those of a folder if one is given."""
+    return sorted(files[0].glob('*.mcap')) if files[0].is_dir() else files
+
+
 def _repaired(files: list[Path], scratch: Path) -> tuple[list[Path], list[str]]:
     """Return what to open, with copies in place of .mcap files that were cut off."""
-    parts = sorted(files[0].glob('*.mcap')) if files[0].is_dir() else files
+    parts = _parts(files)
     cut = [part for part in parts if part.suffix == '.mcap' and is_cut_off(part)]
     if not cut:
         return files, []

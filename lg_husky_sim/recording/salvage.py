@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 import shutil
 import struct
@@ -27,16 +28,27 @@ def is_cut_off(path: Path) -> bool:
         return begins and (size < 2 * len(MAGIC) or file.read() != MAGIC)
 
 
-def _whole(file: BinaryIO, size: int) -> int:
-    # Where the last whole record of the data ends.
+def records(file: BinaryIO, size: int) -> Iterator[tuple[int, int, int]]:
+    """Yield code, place behind the head and length of each whole record of a file of a size."""
     place = len(MAGIC)
     while place + _HEAD.size <= size:
         file.seek(place)
         code, length = _HEAD.unpack(file.read(_HEAD.size))
-        if code in (_DATA_END, _FOOTER) or place + _HEAD.size + length > size:
+        place += _HEAD.size
+        if place + length > size:
+            return
+        yield code, place, length
+        place += length
+
+
+def _whole(file: BinaryIO, size: int) -> int:
+    # Where the last whole record of the data ends.
+    end = len(MAGIC)
+    for code, place, length in records(file, size):
+        if code in (_DATA_END, _FOOTER):
             break
-        place += _HEAD.size + length
-    return place
+        end = place + length
+    return end
 
 
 def salvage(path: Path, folder: Path) -> Path:

@@ -13,13 +13,16 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache, lru_cache, partial
 from importlib import import_module
+from pathlib import Path
 import re
+import struct
 import sys
 from threading import Lock
 from types import SimpleNamespace
 from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.recording.salvage import records
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.yaml_files import LARGEST, read_yaml, refuse_bombs
 import yaml
@@ -27,6 +30,8 @@ import yaml
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
+#: Code of a chunk's record in MCAP, and its first and last time and its size when unpacked.
+_CHUNK, _CHUNK_SIZE = 0x06, struct.Struct('<QQQ')
 #: What is compiled as a block of numbers, whatever its size.
 _NUMBERS = re.compile(
     r'(bool|boolean|byte|char|octet|short|long|unsigned|float|double|u?int(8|16|32|64)'
@@ -78,6 +83,34 @@ def _chunk(opener: Callable[[], Any], data: bytes, size: int) -> bytes:
 
 def _whole(opener: Callable[[], Any], what: str, data: bytes) -> bytes:
     return _unpack(data, opener, reading_limits()['unpacked_chunk'], what)
+
+
+def refuse_large_chunks(path: Path) -> None:
+    """
+    Look at the sizes that the chunks of an .mcap file say to have, before anything is unpacked.
+
+    For readers that make room for as much as a header says, such as ROS's own.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+
+    Raises
+    ------
+    BeyondLimitError
+        If one is too large.
+
+    """
+    most = reading_limits()['unpacked_chunk']
+    with path.open('rb') as file:
+        for code, place, _ in records(file, file.seek(0, 2)):
+            if code != _CHUNK:
+                continue
+            file.seek(place)
+            head = file.read(_CHUNK_SIZE.size)
+            if len(head) == _CHUNK_SIZE.size and (size := _CHUNK_SIZE.unpack(head)[2]) > most:
+                raise BeyondLimitError(
+                    f'a chunk unpacks to {size} bytes by its header; {most} are allowed')
 
 
 class _File:

@@ -11,6 +11,7 @@ rclpy is, messages are made and serialised by it.
 from __future__ import annotations
 
 from importlib.util import find_spec
+import io
 from pathlib import Path
 import sys
 from types import ModuleType, SimpleNamespace
@@ -18,6 +19,7 @@ from typing import Any
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.recording import bags, read_recording, write_recording, writer
+from lg_husky_sim.recording.salvage import records
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
@@ -203,3 +205,18 @@ def test_where_nothing_reads_bags_both_are_named(monkeypatch: pytest.MonkeyPatch
     with pytest.raises(MissingExtraError, match=r'rosbags is needed to read recordings .*pip '
                        'install'):
         read_recording('anything.mcap')
+
+
+@pytest.mark.parametrize('folder', [False, True])
+def test_a_chunk_that_is_large_by_its_header_never_comes_to_rosbag2_py(
+        request: pytest.FixtureRequest, tmp_path: Path, folder: bool) -> None:
+    """It makes room for what the header says."""
+    path = write_recording(tmp_path / 'bag', streams())
+    file = path / 'bag.mcap'
+    data = bytearray(file.read_bytes())
+    place = next(place for code, place, _ in records(io.BytesIO(data), len(data)) if code == 0x06)
+    data[place + 16:place + 24] = (6 * 10**9).to_bytes(8, 'little')
+    file.write_bytes(data)
+    request.getfixturevalue('by_ros')
+    with pytest.raises(RecordingError, match='a chunk unpacks to 6000000000 bytes by its header'):
+        read_recording(path if folder else file)
