@@ -20,10 +20,10 @@ from lg_husky_sim.evaluation.engine import drive, engine_config, engine_robot
 from lg_husky_sim.husky.model import compile_model, HuskyModel
 from lg_husky_sim.husky.model_file import load_model, ModelFile
 from lg_husky_sim.identification.estimate import estimate
-from lg_husky_sim.identification.lanes import operators, tracking_cost
 from lg_husky_sim.identification.options import with_effects
+from lg_husky_sim.identification.paper_objective import PaperObjective, PERIOD
 from lg_husky_sim.identification.search import genetic
-from lg_husky_sim.identification.tracking import PERIOD, TrackingObjective
+from lg_husky_sim.identification.simd_batch import batch_cost, operators
 from lg_husky_sim.identification.unknowns import free_names, search_bounds
 from lg_husky_sim.jit import SWITCH
 from lg_husky_sim.manoeuvres import find_manoeuvre
@@ -77,7 +77,7 @@ def without_numba() -> Iterator[None]:
 
 def numpy_steps(model: HuskyModel, nominal: ModelFile, part: Segment, count: int) -> float:
     """Return the time of one simulation by a loop of numpy products, one a step [s]."""
-    objective = TrackingObjective(model, nominal.parameters, free_names(nominal, ()), [part])
+    objective = PaperObjective(model, nominal.parameters, free_names(nominal, ()), [part])
     track = objective.tracks[0]
     plant = model.at(nominal.parameters).sets[0]
     n, stage = plant.a.shape[0], plant.command
@@ -127,7 +127,7 @@ def genetic_rows(quick: bool) -> None:
     nominal, part = load_model(), circle()
     model = compile_model(nominal.structure)
     free = free_names(nominal, ())
-    objective = TrackingObjective(model, nominal.parameters, free, [part])
+    objective = PaperObjective(model, nominal.parameters, free, [part])
     lower, upper = search_bounds(nominal.parameters, free)
     found = genetic(objective, lower, upper, 0)
     draws = np.random.default_rng(0).uniform(lower, upper, (found.evaluations, lower.size))
@@ -186,7 +186,7 @@ def engine_rows(quick: bool) -> None:
     robot = engine_robot('nominal')
     engine = best(lambda: drive(robot, commands), 1 if quick else 3) / duration
     free = free_names(nominal, ())
-    objective = TrackingObjective(model, nominal.parameters, free, [part])
+    objective = PaperObjective(model, nominal.parameters, free, [part])
     lower, upper = search_bounds(nominal.parameters, free)
     draws = np.random.default_rng(0).uniform(lower, upper, (1600, lower.size))
     objective(draws[:16])
@@ -204,14 +204,14 @@ def engine_rows(quick: bool) -> None:
     alone = best(lambda: simulator.run(state, held), 5) / duration
     say('  over one run of the non-linear kernel with six effects', f'{engine / alone:.0f} ×',
         'at least 500')
-    halves = objective._maker(draws) if objective._maker else None
-    assert halves is not None
-    op = operators(halves, PERIOD)
+    modes = objective._decoupling(draws) if objective._decoupling else None
+    assert modes is not None
+    op = operators(modes, PERIOD)
     track = objective.tracks[0]
 
     def simulate() -> FloatArray:
-        return tracking_cost(op, halves.stage, np.zeros(9), track.commands, track.steps,
-                             track.shares, track.targets)
+        return batch_cost(op, modes.stage, np.zeros(9), track.commands, track.steps,
+                          track.shares, track.targets)
     seconds = best(simulate, 5)
     rate = OPERATIONS * 1600 * objective.steps / seconds
     limit = flop_limit()
@@ -228,9 +228,9 @@ def growth_rows() -> None:
     free = free_names(nominal, ())
     lower, upper = search_bounds(nominal.parameters, free)
     draws = np.random.default_rng(0).uniform(lower, upper, (6400, lower.size))
-    one = TrackingObjective(model, nominal.parameters, free, [circle()])
+    one = PaperObjective(model, nominal.parameters, free, [circle()])
     for recordings in (1, 2, 4, 8):
-        objective = TrackingObjective(model, nominal.parameters, free, [circle()] * recordings)
+        objective = PaperObjective(model, nominal.parameters, free, [circle()] * recordings)
         seconds = best(lambda: objective(draws[:400]))  # noqa: B023
         say(f'growth: {recordings} recordings, {objective.steps} steps, 400 candidates',
             f'{seconds * 1e3:.1f} ms', f'{seconds / objective.steps / 400 * 1e9:.1f} ns a step')

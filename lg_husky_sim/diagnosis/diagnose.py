@@ -28,7 +28,7 @@ from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts
 from lg_husky_sim.diagnosis.localisation import mismatches, Missing, missing_efforts
-from lg_husky_sim.diagnosis.misfit import Misfit, misfit, unsearched
+from lg_husky_sim.diagnosis.model_mismatch import model_mismatch, ModelMismatch, unsearched
 from lg_husky_sim.diagnosis.result import Diagnosis, Rivalry, Verdict
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
@@ -125,14 +125,14 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         if different:
             progress('another robot: what differs', 0.92)
             sized = ModelFile(start.structure, start.numbers)
-            said = _of_other_robot(said, misfit(
+            said = _of_other_robot(said, model_mismatch(
                 different, found, said.held_out_plain, recordings, parts, sized, there, pool))
     sensors = tuple(f.statement for f in seen)
     return Case(replace(said, notes=(*said.notes, *_mended(recordings)), sensors=sensors), found,
                 parts, nominal, rest, features)
 
 
-def _of_other_robot(said: Diagnosis, other: Misfit) -> Diagnosis:
+def _of_other_robot(said: Diagnosis, other: ModelMismatch) -> Diagnosis:
     # The names of a search that ended on another robot are rivals, and no answer.
     sensors = tuple(f for f in said.findings if f.subsystem == Subsystem.SENSOR.value
                     and f.statement.endswith(UNMODELLED))

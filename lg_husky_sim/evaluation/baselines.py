@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from lg_husky_sim.husky.parameters import Parameters
-from lg_husky_sim.identification.problem import Channel, Observations, PERIOD, Piece
+from lg_husky_sim.identification.problem import Channel, FitSegment, Observations, PERIOD
 from lg_husky_sim.signals import FloatArray, TimeSeries
 from lg_husky_sim.simulation.simulator import hold
 from lg_husky_sim.simulation.starting import commanded_until
@@ -48,13 +48,14 @@ class Lag:
     delay: float
 
 
-def driven(piece: Piece, channel: Channel, time_constant: float, delay: float) -> FloatArray:
+def driven(segment: FitSegment, channel: Channel, time_constant: float, delay: float
+           ) -> FloatArray:
     """
     Return a channel's commands after a unit lag and a delay, as the channel would see them.
 
     Parameters
     ----------
-    piece : Piece
+    segment : FitSegment
     channel : Channel
     time_constant, delay : float
         [s]; a time constant of 0 is no lag.
@@ -64,10 +65,11 @@ def driven(piece: Piece, channel: Channel, time_constant: float, delay: float) -
     numpy.ndarray, shape (n_values, n_inputs)
         Averages over the window for increments.
     """
-    late = TimeSeries(piece.commands.times + delay, piece.commands.values, piece.commands.names)
-    held = hold(late, piece.start, PERIOD, piece.count)
-    told = commanded_until(piece.start, piece.commands, piece.twist, piece.wheels_began)
-    before = np.array([[told.forward, told.yaw]])
+    commands = segment.commands
+    late = TimeSeries(commands.times + delay, commands.values, commands.names)
+    held = hold(late, segment.start, PERIOD, segment.count)
+    last = commanded_until(segment.start, commands, segment.twist, segment.initial_wheel_rates)
+    before = np.array([[last.forward, last.yaw]])
     held[:max(0, round(delay / PERIOD))] = before
     states: FloatArray = held
     if time_constant > 0.0:
@@ -80,10 +82,10 @@ def driven(piece: Piece, channel: Channel, time_constant: float, delay: float) -
     for column in _INPUTS[channel.name]:
         if channel.name in ('advance', 'turn'):
             span = channel.times - channel.begins
-            columns.append((_at(way[:, column], piece.start, channel.times)
-                            - _at(way[:, column], piece.start, channel.begins)) / span)
+            columns.append((_at(way[:, column], segment.start, channel.times)
+                            - _at(way[:, column], segment.start, channel.begins)) / span)
         else:
-            columns.append(_at(grid[:, column], piece.start, channel.times))
+            columns.append(_at(grid[:, column], segment.start, channel.times))
     return np.column_stack(columns)
 
 
@@ -96,10 +98,10 @@ def _at(column: FloatArray, start: float, times: FloatArray) -> FloatArray:
 def _stacked(data: Observations, name: str, time_constant: float, delay: float
              ) -> tuple[FloatArray, FloatArray]:
     inputs, values = [], []
-    for piece in data.pieces:
-        for channel in piece.channels:
+    for segment in data.segments:
+        for channel in segment.channels:
             if channel.name == name:
-                inputs.append(driven(piece, channel, time_constant, delay))
+                inputs.append(driven(segment, channel, time_constant, delay))
                 values.append(channel.values)
     return np.concatenate(inputs), np.concatenate(values)
 
@@ -149,9 +151,9 @@ def lag_predictor(lags: dict[str, Lag]) -> Predictor:
     """Return the prediction of fitted lags."""
     def predict(data: Observations) -> FloatArray:
         return np.concatenate([
-            driven(piece, channel, lags[channel.name].time_constant, lags[channel.name].delay)
+            driven(segment, channel, lags[channel.name].time_constant, lags[channel.name].delay)
             @ np.array(lags[channel.name].gains)
-            for piece in data.pieces for channel in piece.channels])
+            for segment in data.segments for channel in segment.channels])
     return predict
 
 
@@ -216,6 +218,6 @@ def kinematic_predictor(model: Kinematics) -> Predictor:
 
     def predict(data: Observations) -> FloatArray:
         return np.concatenate([
-            driven(piece, channel, 0.0, 0.0) @ np.array(gains[channel.name])
-            for piece in data.pieces for channel in piece.channels])
+            driven(segment, channel, 0.0, 0.0) @ np.array(gains[channel.name])
+            for segment in data.segments for channel in segment.channels])
     return predict

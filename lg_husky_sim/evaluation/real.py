@@ -17,7 +17,7 @@ from lg_husky_sim.evaluation.baselines import (
     lag_predictor,
     Predictor,
 )
-from lg_husky_sim.evaluation.steps import halves, steps_of
+from lg_husky_sim.evaluation.steps import alternate_steps, steps_of
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.estimate import estimate
@@ -108,7 +108,7 @@ def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts
     if number < FEWEST:
         raise FitError(f'recording {recording.name} has {number} commanded steps; dividing them '
                        f'needs at least {FEWEST}')
-    fitted, held = halves(whole)
+    fitted, held = alternate_steps(whole)
     refit = estimate(model, parts, data=fitted, seed=seed, starts=starts, jobs=jobs,
                      progress=tell)
     extended_model = with_effects(refit.model, effects)

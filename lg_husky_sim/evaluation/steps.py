@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import itertools
 
-from lg_husky_sim.identification.problem import Channel, Observations, Piece
+from lg_husky_sim.identification.problem import Channel, FitSegment, Observations
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +31,13 @@ class Step:
 
     Parameters
     ----------
-    piece : int
-        Number of the piece in its observations.
+    segment : int
+        Number of the segment in its observations.
     start, end : float
         On the recording's clock [s].
     """
 
-    piece: int
+    segment: int
     start: float
     end: float
 
@@ -56,15 +56,16 @@ def steps_of(data: Observations) -> tuple[Step, ...]:
         In order; commands that hold for less than :data:`SHORTEST` join the step before them.
     """
     found = []
-    for number, piece in enumerate(data.pieces):
-        edges = _edges(piece.commands, piece.start, piece.start + _length(piece))
+    for number, segment in enumerate(data.segments):
+        edges = _edges(segment.commands, segment.start, segment.start + _length(segment))
         found += [Step(number, float(a), float(b))
                   for a, b in itertools.pairwise(edges)]
     return tuple(found)
 
 
-def _length(piece: Piece) -> float:
-    return max((float(c.times[-1]) for c in piece.channels), default=piece.start) - piece.start
+def _length(segment: FitSegment) -> float:
+    ends = (float(c.times[-1]) for c in segment.channels)
+    return max(ends, default=segment.start) - segment.start
 
 
 def _edges(commands: TimeSeries, start: float, end: float) -> FloatArray:
@@ -77,7 +78,7 @@ def _edges(commands: TimeSeries, start: float, end: float) -> FloatArray:
     return np.array([*kept, end])
 
 
-def halves(data: Observations) -> tuple[Observations, Observations]:
+def alternate_steps(data: Observations) -> tuple[Observations, Observations]:
     """
     Return the values of every other step, and those of the rest.
 
@@ -88,7 +89,7 @@ def halves(data: Observations) -> tuple[Observations, Observations]:
     Returns
     -------
     fitted, held_out : Observations
-        Both simulate the same pieces.
+        Both simulate the same segments.
     """
     steps = steps_of(data)
     return (within(data, steps[0::2]), within(data, steps[1::2]))
@@ -98,19 +99,19 @@ def within(data: Observations, steps: Sequence[Step]) -> Observations:
     """
     Return the values that lie in some of the steps; increments by the end of their window.
 
-    A channel of which less than a handful is left in a piece is left out there.
+    A channel of which less than a handful is left in a segment is left out there.
 
     Parameters
     ----------
     data : Observations
     steps : sequence of Step
     """
-    pieces = []
-    for number, piece in enumerate(data.pieces):
-        own = [step for step in steps if step.piece == number]
-        channels = tuple(_picked(channel, own) for channel in piece.channels)
-        pieces.append(replace(piece, channels=tuple(c for c in channels if c.values.size > 3)))
-    return Observations(tuple(pieces))
+    segments = []
+    for number, segment in enumerate(data.segments):
+        own = [step for step in steps if step.segment == number]
+        channels = tuple(_picked(channel, own) for channel in segment.channels)
+        segments.append(replace(segment, channels=tuple(c for c in channels if c.values.size > 3)))
+    return Observations(tuple(segments))
 
 
 def _picked(channel: Channel, steps: Sequence[Step]) -> Channel:

@@ -46,7 +46,7 @@ class Confidence:
     Parameters
     ----------
     unknowns : tuple of Unknown
-        Those that all pieces share; the others follow them.
+        Those that all segments share; the others follow them.
     covariance, correlation : numpy.ndarray, shape (n_unknowns, n_unknowns)
         Of the varied quantities.
     condition : float
@@ -58,7 +58,7 @@ class Confidence:
     inflation : numpy.ndarray, shape (n_unknowns,)
         Variance over that of white residuals of unit size.
     local : tuple of Unknown
-        Corrections of the starts of single pieces.
+        Corrections of the starts of single segments.
     local_deviations : numpy.ndarray, shape (n_local,)
         Their standard deviations.
     """
@@ -87,8 +87,8 @@ def _block_sums(problem: Problem, slope: FloatArray, white: FloatArray) -> Float
     number = np.zeros(white.size, dtype=np.int64)
     for one in observations.slices:
         part = slice(one.first, one.last)
-        start = observations.pieces[one.piece].start
-        number[part] = one.piece * 1_000_000 + (
+        start = observations.segments[one.segment].start
+        number[part] = one.segment * 1_000_000 + (
             (observations.times[part] - start) / BLOCK).astype(np.int64)
     _, place = np.unique(number, return_inverse=True)
     scores = np.zeros((int(place.max(initial=0)) + 1, slope.shape[1]))
@@ -117,7 +117,7 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     packed = metric.whiten(observations, solution.jacobian)
     priors = np.array([0.0 if np.isinf(u.deviation) else u.deviation ** -2
                        for u in solution.unknowns])
-    # Starts of single pieces follow the unknowns that all share, and cost them certainty.
+    # Starts of single segments follow the unknowns that all share, and cost them certainty.
     curvature, slope, follow, alone = layout.eliminate(
         layout.gram(packed) + np.diag(priors), packed)
     count = slope.shape[1]

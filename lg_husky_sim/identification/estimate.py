@@ -15,6 +15,7 @@ from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.confidence import Confidence, confidence, undetermined
 from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
 from lg_husky_sim.identification.multistart import best_solution, Ends, is_autocorrelated, refine
+from lg_husky_sim.identification.paper_objective import PaperObjective
 from lg_husky_sim.identification.problem import Observations, observations, UNITS
 from lg_husky_sim.identification.profile import Profile, profile
 from lg_husky_sim.identification.result import (
@@ -35,7 +36,6 @@ from lg_husky_sim.identification.start_states import (
     start_states,
     start_warnings,
 )
-from lg_husky_sim.identification.tracking import TrackingObjective
 from lg_husky_sim.identification.unknowns import (
     free_names,
     NUISANCES,
@@ -120,8 +120,8 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
                        ends.evaluations + evaluations, began, profiles, tell, ends=ends)
     if nuisance:
         raise FitError(f'nuisance {nuisance[0]!r} can only be estimated by least-squares')
-    objective = TrackingObjective(compile_model(model.structure), model.parameters, names,
-                                  segments)
+    objective = PaperObjective(compile_model(model.structure), model.parameters, names,
+                               segments)
     found = _search(method, objective, *search_bounds(model.parameters, names), seed, tell)
     fitted = replace(model, parameters=model.parameters.replacing(
         dict(zip(names, map(float, found.values), strict=True))))
@@ -222,8 +222,8 @@ def channel_fits(data: Observations, segments: Sequence[Segment], before: ModelF
         rms = [float(np.sqrt(np.mean(error[mask] ** 2))) for error in errors]
         rows.append(ChannelFit(name, UNITS[name], int(mask.sum()), rms[0], rms[1]))
     if any('pose' in s.streams for s in segments):
-        tracks = TrackingObjective(compile_model(after.structure), after.parameters, (),
-                                   segments).tracks
+        tracks = PaperObjective(compile_model(after.structure), after.parameters, (),
+                                segments).tracks
         squares = [[np.sum((t.simulate(plant) - t.targets) ** 2, axis=1) for t in tracks]
                    for plant in plants]
         rms = [float(np.sqrt(np.mean(np.concatenate(square)))) for square in squares]

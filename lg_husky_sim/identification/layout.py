@@ -1,11 +1,11 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Normal equations in which every piece has unknowns of its own beside those that all share.
+Normal equations in which every segment has unknowns of its own beside those that all share.
 
-A piece's own unknowns move its own values alone. So the derivatives by the first own unknown of
-every piece fit into one column, those by the second into the next, and one simulation gives
-each; and the equations are solved piece by piece, then once for what is shared.
+A segment's own unknowns move its own values alone. So the derivatives by the first own unknown of
+every segment fit into one column, those by the second into the next, and one simulation gives
+each; and the equations are solved segment by segment, then once for what is shared.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 
 class Local(Protocol):
-    """What is to be known of an unknown: its piece and its column there, or None if shared."""
+    """What is to be known of an unknown: its segment and its column there, or None if shared."""
 
     @property
     def local(self) -> tuple[int, int] | None:
-        """Number of the piece, and of the column."""
+        """Number of the segment, and of the column."""
 
 
 class Layout:
@@ -35,27 +35,28 @@ class Layout:
     ----------
     observations : Observations
     unknowns : sequence
-        Pieces with own unknowns have the same columns.
+        Segments with own unknowns have the same columns.
 
     Attributes
     ----------
     shared : numpy.ndarray of int, shape (n_shared,)
-        Unknowns that all pieces share.
-    own : numpy.ndarray of int, shape (n_pieces, n_own)
-        Unknowns of each piece that has its own.
+        Unknowns that all segments share.
+    own : numpy.ndarray of int, shape (n_segments, n_own)
+        Unknowns of each segment that has its own.
     rows : tuple of slice
-        Values of each of these pieces.
+        Values of each of these segments.
     """
 
     def __init__(self, observations: Observations, unknowns: Sequence[Local]) -> None:
         self.size = len(unknowns)
         self.shared = np.array([i for i, u in enumerate(unknowns) if u.local is None], dtype=int)
         places = {u.local: i for i, u in enumerate(unknowns) if u.local is not None}
-        pieces = sorted({piece for piece, _ in places})
+        segments = sorted({segment for segment, _ in places})
         columns = sorted({column for _, column in places})
-        self.own = np.array([[places[piece, column] for column in columns] for piece in pieces],
-                            dtype=int).reshape(len(pieces), len(columns))
-        self.rows = tuple(_rows(observations, piece) for piece in pieces)
+        self.own = np.array(
+            [[places[segment, column] for column in columns] for segment in segments],
+            dtype=int).reshape(len(segments), len(columns))
+        self.rows = tuple(_rows(observations, segment) for segment in segments)
 
     @property
     def columns(self) -> int:
@@ -97,7 +98,7 @@ class Layout:
         Returns
         -------
         numpy.ndarray, shape (n_unknowns, n_unknowns)
-            Zero between own unknowns of different pieces.
+            Zero between own unknowns of different segments.
         """
         if not self.own.size:
             return np.asarray(slope.T @ slope)
@@ -148,8 +149,8 @@ class Layout:
 
     def _blocks(self, matrix: FloatArray, free: NDArray[np.bool_]
                 ) -> tuple[FloatArray, FloatArray]:
-        # What couples the own unknowns of each piece, shape (n_pieces, n_own, n_own), and them
-        # with the shared ones, shape (n_pieces, n_own, n_shared); held ones stand alone.
+        # What couples the own unknowns of each segment, shape (n_segments, n_own, n_own), and them
+        # with the shared ones, shape (n_segments, n_own, n_shared); held ones stand alone.
         inner = matrix[self.own[:, :, None], self.own[:, None, :]]
         across = matrix[self.own[:, :, None], self.shared[None, None, :]]
         held = ~free[self.own]
@@ -177,9 +178,9 @@ class Layout:
             Of the shared unknowns where the own ones follow them.
         along : numpy.ndarray, shape (n_values, n_shared)
             Derivatives by the shared unknowns while the own ones follow.
-        follow : numpy.ndarray, shape (n_pieces, n_own, n_shared)
+        follow : numpy.ndarray, shape (n_segments, n_own, n_shared)
             Minus by how much the own unknowns follow the shared ones.
-        alone : numpy.ndarray, shape (n_pieces, n_own)
+        alone : numpy.ndarray, shape (n_segments, n_own)
             Variance of each own unknown if the shared ones were known.
         """
         n = self.shared.size
@@ -197,6 +198,6 @@ class Layout:
         return curvature, along, follow, np.diagonal(inverse, axis1=1, axis2=2)
 
 
-def _rows(observations: Observations, piece: int) -> slice:
-    slices = [one for one in observations.slices if one.piece == piece]
+def _rows(observations: Observations, segment: int) -> slice:
+    slices = [one for one in observations.slices if one.segment == segment]
     return slice(slices[0].first, slices[-1].last) if slices else slice(0, 0)

@@ -42,7 +42,7 @@ class Unknown:
     extra : bool
         Whether it belongs to the observation instead of the model.
     local : tuple of int, optional
-        For a correction of the start of one piece: the piece's number, and which correction.
+        For a correction of the start of one segment: the segment's number, and which correction.
     """
 
     name: str
@@ -89,7 +89,7 @@ class Solution:
     predicted : numpy.ndarray, shape (n_values,)
     jacobian : numpy.ndarray, shape (n_values, n_columns)
         Derivatives of the prediction by the varied quantities, not whitened; a column for each
-        unknown, those of single pieces packed as :class:`Layout` says.
+        unknown, those of single segments packed as :class:`Layout` says.
     cost : float
         Half the sum of squares, priors included [nats].
     data_cost : float
@@ -201,7 +201,7 @@ class Problem:
         Returns
         -------
         numpy.ndarray, shape (n_values, n_columns)
-            Those of the unknowns that all pieces share, then the packed ones.
+            Those of the unknowns that all segments share, then the packed ones.
         """
         layout = self.layout
         columns = [] if known is None else [*known.T]
@@ -211,7 +211,7 @@ class Problem:
         found: dict[int, FloatArray] = {}
         if any(self.unknowns[i].extra for i in order) or layout.own.size:
             self.predict(varied)
-        # Starts next: they need no new plant, and only pieces that begin in motion.
+        # Starts next: they need no new plant, and only segments that begin in motion.
         packed = [self._packed(column, varied, predicted) for column in layout.own.T]
         for i in order:
             found[i] = self._column(i, varied, predicted)
@@ -221,7 +221,7 @@ class Problem:
 
     def _packed(self, places: NDArray[np.int64], varied: FloatArray, predicted: FloatArray
                 ) -> FloatArray:
-        # One own unknown of every piece, all moved at once: none shows in another's values.
+        # One own unknown of every segment, all moved at once: none shows in another's values.
         for sign in (1.0, -1.0):
             moved = np.array(varied)
             for i in places:

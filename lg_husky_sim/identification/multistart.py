@@ -24,9 +24,9 @@ STEPS = 40
 TOLERANCE = 1e-3
 #: Passes over the noise: scales and correlation from the fit before.
 PASSES = 2
-#: Correlation from one value to the next above which a residual is taken for a misfit of the
+#: Correlation from one value to the next above which a residual is taken for an error of the
 #: model, which is not whitened away; below it, for noise of a sensor, which is.
-MISFIT = 0.3
+AUTOCORRELATED = 0.3
 #: Mean square of a standardised residual below which there is nothing left to explain.
 NOTHING = 0.1
 #: Standardised residual from which a value loses weight (Huber's loss).
@@ -164,8 +164,8 @@ def noise_metric(data: Observations, residual: FloatArray, predicted: FloatArray
     Returns
     -------
     Metric
-        A channel is whitened only where its residual does not linger: one that does is a misfit
-        of the model, and whitening would turn the fit away from it. Outliers lose weight.
+        A channel is whitened only where its residual is not autocorrelated: one that is shows an
+        error of the model, and whitening would turn the fit away from it. Outliers lose weight.
     """
     scale = scales(data, residual, predicted)
     plain = metric(data, residual, scale, order=0)
@@ -199,7 +199,7 @@ def is_autocorrelated(data: Observations, scaled: FloatArray, name: str) -> bool
             below += float(part @ part)
             count += part.size
     # What is far below the least noise that is believed is rounding, whatever its shape.
-    return above > MISFIT * below and below > NOTHING * count
+    return above > AUTOCORRELATED * below and below > NOTHING * count
 
 
 def refine(data: Observations, model: ModelFile, unknowns: Sequence[Unknown],

@@ -311,7 +311,7 @@ def metric(observations: Observations, residual: FloatArray, scale: FloatArray,
 
 
 def _taps(parts: list[FloatArray], order: int) -> FloatArray:
-    # Yule-Walker on values clipped at four deviations, pooled over the pieces.
+    # Yule-Walker on values clipped at four deviations, pooled over the segments.
     deviation = max(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))), 1e-12)
     robust = max(spread(np.concatenate(parts)), 0.2 * deviation)
     clipped = [np.clip(part, -4.0 * robust, 4.0 * robust) for part in parts]

@@ -16,19 +16,19 @@ from typing import TypeAlias
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.plant import ENCODER_WINDOW, Plant, PlantSet, SensorModel
-from lg_husky_sim.identification.piece_simulation import simulate_piece
-from lg_husky_sim.identification.pieces import (
+from lg_husky_sim.identification.fit_segments import (
     Channel,
     CHANNELS,
     correction_name,
     CORRECTIONS,
+    FitSegment,
     PERIOD,
-    Piece,
-    piece_of,
+    segment_for_fit,
     SETTLE,
     UNITS,
 )
 from lg_husky_sim.identification.sampling import sample
+from lg_husky_sim.identification.segment_simulation import simulate_segment
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.event_kernel import COLUMNS
@@ -36,8 +36,19 @@ from lg_husky_sim.simulation.simulator import Simulator
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ['CHANNELS', 'PERIOD', 'UNITS', 'Channel', 'Observations', 'Piece', 'Slice',
-           'late_mask', 'observations', 'piece_of', 'simulate_piece']
+__all__ = [
+    'CHANNELS',
+    'PERIOD',
+    'UNITS',
+    'Channel',
+    'FitSegment',
+    'Observations',
+    'Slice',
+    'late_mask',
+    'observations',
+    'segment_for_fit',
+    'simulate_segment',
+]
 
 Simulated: TypeAlias = tuple[FloatArray, tuple[FloatArray, ...]]
 _COLUMN = {name: i for i, name in enumerate(COLUMNS)}
@@ -45,9 +56,9 @@ _COLUMN = {name: i for i, name in enumerate(COLUMNS)}
 
 @dataclass(frozen=True)
 class Slice:
-    """Where one channel of one piece lies in the measurement vector."""
+    """Where one channel of one segment lies in the measurement vector."""
 
-    piece: int
+    segment: int
     channel: str
     first: int
     last: int
@@ -56,11 +67,11 @@ class Slice:
 @dataclass(frozen=True, eq=False)
 class Observations:
     """
-    All pieces, and their measurements as one vector.
+    All segments, and their measurements as one vector.
 
     Parameters
     ----------
-    pieces : tuple of Piece
+    segments : tuple of FitSegment
     common : numpy.ndarray, shape (n_values, n_common), optional
         Columns of errors that a model may make everywhere alike, each of the size that is
         believed possible; a metric gives them no weight.
@@ -71,7 +82,7 @@ class Observations:
         In the order of the vector.
     """
 
-    pieces: tuple[Piece, ...]
+    segments: tuple[FitSegment, ...]
     common: FloatArray | None = None
     measured: FloatArray = field(init=False)
     times: FloatArray = field(init=False)
@@ -80,8 +91,8 @@ class Observations:
     def __post_init__(self) -> None:
         """Stack the measurements."""
         values, times, slices, at = [np.zeros(0)], [np.zeros(0)], [], 0
-        for number, piece in enumerate(self.pieces):
-            for channel in piece.channels:
+        for number, segment in enumerate(self.segments):
+            for channel in segment.channels:
                 values.append(channel.values)
                 times.append(channel.times)
                 slices.append(Slice(number, channel.name, at, at + channel.values.size))
@@ -114,7 +125,7 @@ class Observations:
         extra : mapping of str to float, optional
             Small unknowns of the observation that belong to no effect: latency,
             delay_wheels, delay_imu, delay_pose [s], gyro_bias [rad/s]; and corrections of the
-            start of a piece, such as ``initial_forward@drive/3`` [m/s].
+            start of a segment, such as ``initial_forward@drive/3`` [m/s].
 
         Returns
         -------
@@ -135,54 +146,54 @@ class Observations:
 
         Returns
         -------
-        numpy.ndarray, shape (n_pieces, 4), or None
-            In the order of :data:`~lg_husky_sim.identification.pieces.CORRECTIONS`; None if
+        numpy.ndarray, shape (n_segments, 4), or None
+            In the order of :data:`~lg_husky_sim.identification.fit_segments.CORRECTIONS`; None if
             there is none.
         """
         if not any('@' in name for name in extra):
             return None
-        return np.array([[extra.get(correction_name(piece, place), 0.0)
-                          for place in range(len(CORRECTIONS))] for piece in self.pieces])
+        return np.array([[extra.get(correction_name(segment, place), 0.0)
+                          for place in range(len(CORRECTIONS))] for segment in self.segments])
 
     def simulate(self, plant: Plant, latency: float = 0.0,
                  corrections: FloatArray | None = None, known: Simulated | None = None
                  ) -> tuple[FloatArray, ...]:
         """
-        Simulate every piece.
+        Simulate every segment.
 
         Parameters
         ----------
         plant : Plant
         latency : float
             Further dead time of the commands [s].
-        corrections : numpy.ndarray, shape (n_pieces, 4), optional
+        corrections : numpy.ndarray, shape (n_segments, 4), optional
             Of the measured starts.
         known : tuple, optional
-            Corrections and their grids, of this plant and latency: a piece whose corrections
+            Corrections and their grids, of this plant and latency: a segment whose corrections
             are the same is not simulated again.
 
         Returns
         -------
         tuple of numpy.ndarray, shape (count + 1, 15)
-            The kernel's columns, a piece each.
+            The kernel's columns, a segment each.
         """
         simulators: dict[tuple[PlantSet, ...], Simulator] = {}
         grids = []
-        for place, piece in enumerate(self.pieces):
+        for place, segment in enumerate(self.segments):
             own = None if corrections is None else corrections[place]
             if known is not None and own is not None and np.array_equal(own, known[0][place]):
                 grids.append(known[1][place])
                 continue
-            here = self.plant_in(plant, piece.recording)
+            here = self.plant_in(plant, segment.recording)
             if here.sets not in simulators:
                 simulators[here.sets] = Simulator(here, PERIOD, fine_pose=False)
-            grids.append(simulate_piece(simulators[here.sets], piece, latency, own))
+            grids.append(simulate_segment(simulators[here.sets], segment, latency, own))
         return tuple(grids)
 
     def observe(self, plant: Plant, grids: Sequence[FloatArray],
                 extra: Mapping[str, float] | None = None) -> FloatArray:
         """
-        Return what the sensors read of simulated pieces.
+        Return what the sensors read of simulated segments.
 
         Parameters
         ----------
@@ -196,14 +207,14 @@ class Observations:
         -------
         numpy.ndarray, shape (n_values,)
         """
-        parts = [_observe(piece, self.plant_in(plant, piece.recording), grid, extra or {})
-                 for piece, grid in zip(self.pieces, grids, strict=True)]
+        parts = [_observe(segment, self.plant_in(plant, segment.recording), grid, extra or {})
+                 for segment, grid in zip(self.segments, grids, strict=True)]
         return np.concatenate(parts) if parts else np.zeros(0)
 
     @cached_property
     def recordings(self) -> tuple[str, ...]:
         """Names of the recordings in their order."""
-        return tuple(dict.fromkeys(piece.recording for piece in self.pieces))
+        return tuple(dict.fromkeys(segment.recording for segment in self.segments))
 
     def plant_in(self, plant: Plant, recording: str) -> Plant:
         """Return a plant as it is in one of the recordings."""
@@ -212,28 +223,28 @@ class Observations:
             recording, onset.before(self.recordings))
 
 
-def _observe(piece: Piece, plant: Plant, grid: FloatArray, extra: Mapping[str, float]
+def _observe(segment: FitSegment, plant: Plant, grid: FloatArray, extra: Mapping[str, float]
              ) -> FloatArray:
     rates = grid[:, _COLUMN['yaw_rate']]
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (rates[1:] + rates[:-1])) * PERIOD])
     parts = []
-    for channel in piece.channels:
-        seen = [_seen(channel, piece, grid, angle, one.sensors, extra) for one in plant.sets]
+    for channel in segment.channels:
+        seen = [_seen(channel, segment, grid, angle, one.sensors, extra) for one in plant.sets]
         value = seen[0]
         if len(seen) > 1 and plant.onset is not None:
-            value = np.where(late_mask(plant, piece, channel.times), seen[1], seen[0])
+            value = np.where(late_mask(plant, segment, channel.times), seen[1], seen[0])
         parts.append(value)
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
-def late_mask(plant: Plant, piece: Piece, times: FloatArray) -> NDArray[np.bool_]:
+def late_mask(plant: Plant, segment: FitSegment, times: FloatArray) -> NDArray[np.bool_]:
     """
     Return at which stamps the late effects of a plant are on.
 
     Parameters
     ----------
     plant : Plant
-    piece : Piece
+    segment : FitSegment
     times : numpy.ndarray, shape (n,)
         On the recording's clock [s].
 
@@ -241,19 +252,19 @@ def late_mask(plant: Plant, piece: Piece, times: FloatArray) -> NDArray[np.bool_
     -------
     numpy.ndarray of bool, shape (n,)
     """
-    x = np.full(times.size, np.nan) if piece.pose is None else np.interp(
-        times, piece.pose.times, piece.pose.column('x'))
+    x = np.full(times.size, np.nan) if segment.pose is None else np.interp(
+        times, segment.pose.times, segment.pose.column('x'))
     return plant.late(times, x)
 
 
-def _seen(channel: Channel, piece: Piece, grid: FloatArray, angle: FloatArray,
+def _seen(channel: Channel, segment: FitSegment, grid: FloatArray, angle: FloatArray,
           sensors: SensorModel, extra: Mapping[str, float]) -> FloatArray:
-    start, name = piece.start, channel.name
+    start, name = segment.start, channel.name
     if name in ('wheel_left', 'wheel_right'):
         late = sensors.delay_wheels + extra.get('delay_wheels', 0.0)
         factor = sensors.encoder_left if name == 'wheel_left' else sensors.encoder_right
         ends = channel.times - late
-        if piece.sampled:
+        if segment.sampled:
             return factor * sample(grid[:, _COLUMN[name]], start, ends)
         angles = grid[:, _COLUMN[name.replace('wheel', 'angle')]]
         return factor * (sample(angles, start, ends) - sample(
@@ -294,10 +305,11 @@ def observations(segments: Sequence[Segment], settle: float = SETTLE) -> Observa
     RecordingError
         If none of them can be used.
     """
-    pieces = tuple(p for p in (piece_of(s, settle) for s in segments) if p is not None)
-    if not pieces:
+    usable = tuple(one for one in (segment_for_fit(s, settle) for s in segments)
+                   if one is not None)
+    if not usable:
         names = ', '.join(sorted({s.recording for s in segments})) or 'nothing'
         raise RecordingError(
             f'no usable segment in {names}: a segment needs commands, {2 * SETTLE:g} s of data '
             'and wheel rates, a gyro or a pose')
-    return Observations(pieces)
+    return Observations(usable)

@@ -43,7 +43,7 @@ class Link:
     ----------
     channel, source : str
     operator : scipy.sparse.csr_array, shape (n_values, n_values)
-        Rows of other channels, and of pieces without the source, are empty.
+        Rows of other channels, and of segments without the source, are empty.
     """
 
     channel: str
@@ -65,19 +65,19 @@ def links(observations: Observations) -> tuple[Link, ...]:
     tuple of Link
     """
     size = observations.measured.size
-    known = {(s.piece, s.channel): s for s in observations.slices}
+    known = {(s.segment, s.channel): s for s in observations.slices}
     found = []
     for channel, sources in SOURCES.items():
         for source, members in sources.items():
             rows, columns, weights = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
-            for number, piece in enumerate(observations.pieces):
+            for number, segment in enumerate(observations.segments):
                 if any((number, name) not in known for name in (
                         channel, *(name for name, _ in members))):
                     continue
                 target = known[number, channel]
-                own = next(c for c in piece.channels if c.name == channel)
+                own = next(c for c in segment.channels if c.name == channel)
                 for name, part in members:
-                    other = next(c for c in piece.channels if c.name == name)
+                    other = next(c for c in segment.channels if c.name == name)
                     first = known[number, name].first
                     row, column, weight = averaging(other.times, own.begins, own.times)
                     rows.append(row + target.first)

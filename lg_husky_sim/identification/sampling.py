@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from lg_husky_sim.identification.pieces import PERIOD
+from lg_husky_sim.identification.fit_segments import PERIOD
 from lg_husky_sim.jit import compiled, jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np

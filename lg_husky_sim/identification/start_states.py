@@ -12,14 +12,14 @@ from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.identification.least_squares import Unknown
-from lg_husky_sim.identification.pieces import (
+from lg_husky_sim.identification.fit_segments import (
     at_rest,
     correction_name,
     CORRECTIONS,
     SETTLE,
     SETTLE_ESTIMATED,
 )
+from lg_husky_sim.identification.least_squares import Unknown
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.signals import BodyTwist, FloatArray
 from lg_husky_sim.simulation.simulator import Simulator
@@ -133,7 +133,7 @@ def remembered(plant: Plant, settle: float) -> tuple[int, ...]:
 def start_unknowns(data: Observations, plant: Plant, settle: float
                    ) -> tuple[Unknown, ...]:
     """
-    Return the corrections of the start of every piece that begins in motion.
+    Return the corrections of the start of every segment that begins in motion.
 
     Parameters
     ----------
@@ -150,26 +150,26 @@ def start_unknowns(data: Observations, plant: Plant, settle: float
     Raises
     ------
     FitError
-        If two pieces have one name, or the data have common errors, which tie all pieces to each
-        other.
+        If two segments have one name, or the data have common errors, which tie all segments to
+        each other.
     """
     if data.common is not None:
         raise FitError(f'{INITIAL_STATE} cannot be estimated where errors are common to all '
                        'segments')
-    names = [piece.name for piece in data.pieces]
+    names = [segment.name for segment in data.segments]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise FitError(f'{INITIAL_STATE} needs segments with names of their own; '
                        f'two are named {twice}')
     found = []
     places = remembered(plant, settle)
-    for number, piece in enumerate(data.pieces):
-        if at_rest(piece):
+    for number, segment in enumerate(data.segments):
+        if at_rest(segment):
             continue
         for place in places:
             _, bound, step, measured, open_ = WIDTHS[CORRECTIONS[place]]
-            deviation = measured if piece.told[place] else open_
-            found.append(Unknown(correction_name(piece, place), False, 0.0, deviation, -bound,
+            deviation = measured if segment.measured[place] else open_
+            found.append(Unknown(correction_name(segment, place), False, 0.0, deviation, -bound,
                                  bound, step, extra=True, local=(number, place)))
     return tuple(found)
 
@@ -183,7 +183,7 @@ def start_states(data: Observations, unknowns: Sequence[Unknown], values: Sequen
     ----------
     data : Observations
     unknowns : sequence of Unknown
-        Those with a piece of their own.
+        Those with a segment of their own.
     values : sequence of float
         Estimates.
     deviations : numpy.ndarray, shape (n_unknowns,)
@@ -195,10 +195,11 @@ def start_states(data: Observations, unknowns: Sequence[Unknown], values: Sequen
                                          strict=True):
         if unknown.local is None:
             continue
-        piece, place = data.pieces[unknown.local[0]], unknown.local[1]
+        segment, place = data.segments[unknown.local[0]], unknown.local[1]
         quantity = CORRECTIONS[place]
         found.append(StartState(
-            unknown.name, quantity, piece.name, WIDTHS[quantity][0], piece.began[place], value,
+            unknown.name, quantity, segment.name, WIDTHS[quantity][0],
+            segment.initial_state[place], value,
             value - reach * deviation, value + reach * deviation,
             deviation < OPEN * unknown.deviation,
             abs(value) >= unknown.upper * (1.0 - 1e-9)))

@@ -16,7 +16,7 @@ from lg_husky_sim.evaluation.baselines import (
     lag_predictor,
 )
 from lg_husky_sim.evaluation.real import evaluate_steps, LABELS, steps_data, steps_table
-from lg_husky_sim.evaluation.steps import halves, steps_of, within
+from lg_husky_sim.evaluation.steps import alternate_steps, steps_of, within
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.identification.options import with_effects
@@ -66,7 +66,7 @@ def test_steps_are_those_that_were_commanded(data: Observations) -> None:
 
 
 def test_every_value_is_fitted_or_held_out(data: Observations) -> None:
-    fitted, held = halves(data)
+    fitted, held = alternate_steps(data)
     assert fitted.measured.size + held.measured.size == data.measured.size
     assert set(fitted.times) | set(held.times) == set(data.times)
     # Simulated throughout, so a held-out value is predicted as in the whole recording.
@@ -83,14 +83,14 @@ def test_every_value_is_fitted_or_held_out(data: Observations) -> None:
 
 def test_a_lag_is_found_again(data: Observations) -> None:
     # The channel's values are replaced by those of a known lag.
-    pieces = []
-    for piece in data.pieces:
+    segments = []
+    for segment in data.segments:
         channels = tuple(
-            type(c)(c.name, c.times, driven(piece, c, 0.25, 0.12) @ np.array(
+            type(c)(c.name, c.times, driven(segment, c, 0.25, 0.12) @ np.array(
                 [5.0, -1.5] if c.name == 'wheel_left' else [5.0, 1.5]
-                if c.name == 'wheel_right' else [0.9]), c.begins) for c in piece.channels)
-        pieces.append(replace(piece, channels=channels))
-    made = Observations(tuple(pieces))
+                if c.name == 'wheel_right' else [0.9]), c.begins) for c in segment.channels)
+        segments.append(replace(segment, channels=channels))
+    made = Observations(tuple(segments))
     lags = fit_lags(made)
     for name, lag in lags.items():
         assert lag.time_constant == pytest.approx(0.25, abs=0.02), name
@@ -123,10 +123,10 @@ def test_a_drive_without_turns_keeps_the_nominal_track() -> None:
 
 def test_a_handful_of_values_is_no_channel(data: Observations) -> None:
     """Of the encoders, that send seven times a second, a short step holds too few."""
-    (piece,) = within(data, [replace(steps_of(data)[1], end=4.4)]).pieces
-    assert {channel.name for channel in piece.channels} == set()
-    (piece,) = within(data, [replace(steps_of(data)[1], end=4.8)]).pieces
-    assert 'wheel_left' in {channel.name for channel in piece.channels}
+    (segment,) = within(data, [replace(steps_of(data)[1], end=4.4)]).segments
+    assert {channel.name for channel in segment.channels} == set()
+    (segment,) = within(data, [replace(steps_of(data)[1], end=4.8)]).segments
+    assert 'wheel_left' in {channel.name for channel in segment.channels}
 
 
 def test_what_the_base_does_is_found_on_held_out_steps() -> None:

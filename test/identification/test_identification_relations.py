@@ -72,12 +72,12 @@ def test_a_gyro_fault_stands_out_of_a_wrongly_predicted_motion(data: Observation
     assert seen[1] > 1.5 * seen[0]
 
 
-def test_links_join_channels_of_one_piece_only(
+def test_links_join_channels_of_one_segment_only(
         make_drive: Callable[..., Segment]) -> None:
     two = observations([make_drive(recording='a'), make_drive(seed=2, recording='b')])
     owner = np.zeros(two.measured.size, dtype=int)
     for one in two.slices:
-        owner[one.first:one.last] = one.piece
+        owner[one.first:one.last] = one.segment
     assert len(links(two)) == 4
     for link in links(two):
         row, column = link.operator.nonzero()

@@ -11,8 +11,8 @@ from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.identification.piece_simulation import ANGLES, RESET, simulate_piece
-from lg_husky_sim.identification.pieces import PERIOD, Piece
+from lg_husky_sim.identification.fit_segments import FitSegment, PERIOD
+from lg_husky_sim.identification.segment_simulation import ANGLES, RESET, simulate_segment
 from lg_husky_sim.signals import BodyTwist, FloatArray, TimeSeries
 from lg_husky_sim.simulation.effort_kernel import WHEEL_ERROR
 from lg_husky_sim.simulation.event_kernel import COLUMNS
@@ -35,9 +35,9 @@ def plant(torque: float) -> Plant:
 def simulated(torque: float, angles: FloatArray | None = None) -> FloatArray:
     commands = TimeSeries(np.array([0.0]), np.array([[0.6, 0.0]]), ('forward', 'yaw'))
     turned = None if angles is None else TimeSeries(STAMPS, angles, ('left', 'right'))
-    piece = Piece('drive', 0, 0.0, COUNT, commands, (), None, BodyTwist(), (0.0, 0.0),
-                  (0.0, 0.0), turned=turned)
-    return simulate_piece(Simulator(plant(torque), PERIOD, fine_pose=False), piece)
+    segment = FitSegment('drive', 0, 0.0, COUNT, commands, (), None, BodyTwist(), (0.0, 0.0),
+                         (0.0, 0.0), turned=turned)
+    return simulate_segment(Simulator(plant(torque), PERIOD, fine_pose=False), segment)
 
 
 def test_measured_angles_that_agree_change_nothing() -> None:
@@ -79,15 +79,15 @@ def test_a_play_and_a_faulty_encoder_do_not_move_the_wheel() -> None:
     assert odd.sets[0].sensors.encoder_left == pytest.approx(0.8)
     commands = TimeSeries(np.array([0.0, 3.0, 6.0]), np.array(
         [[0.6, 0.0], [-0.6, 0.0], [0.6, 0.0]]), ('forward', 'yaw'))
-    piece = Piece('drive', 0, 0.0, COUNT, commands, (), None, BodyTwist(), (0.0, 0.0),
-                  (0.0, 0.0))
+    segment = FitSegment('drive', 0, 0.0, COUNT, commands, (), None, BodyTwist(), (0.0, 0.0),
+                         (0.0, 0.0))
     simulator = Simulator(odd, PERIOD, fine_pose=False)
-    free = simulate_piece(simulator, piece)
+    free = simulate_segment(simulator, segment)
 
     def held(factor: float, shift: float) -> FloatArray:
         read = free[:, ANGLES] * np.array([factor, 1.0])
         read[1:] += shift
-        return simulate_piece(simulator, replace(piece, turned=TimeSeries(
+        return simulate_segment(simulator, replace(segment, turned=TimeSeries(
             STAMPS, read, ('left', 'right'))))
     # The last bit of an angle moves the steps at the stops of the play, each of which errs by
     # WHEEL_ERROR [rad/s] at most; there the rate of an encoder jumps, and with it the current.

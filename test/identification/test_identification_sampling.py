@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from lg_husky_sim.identification import sampling
-from lg_husky_sim.identification.pieces import PERIOD
+from lg_husky_sim.identification.fit_segments import PERIOD
 import numpy as np
 import pytest
 

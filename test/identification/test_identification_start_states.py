@@ -134,7 +134,7 @@ def test_packed_derivatives_are_those_of_each_unknown(
     assert np.linalg.norm(dense[:, problem.layout.own[0]]) > 1.0
 
 
-def test_solving_piece_by_piece_is_solving_at_once(
+def test_solving_segment_by_segment_is_solving_at_once(
         husky: ModelFile, moving: tuple[list[Segment], list[float]]) -> None:
     problem = _problem(husky, moving[0][:3])
     layout, draws = problem.layout, np.random.default_rng(1)

@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A dead time from rest and in motion: what was commanded until a piece begins."""
+"""A dead time from rest and in motion: what was commanded until a segment begins."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model, ModelFile
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.estimate import estimate
+from lg_husky_sim.identification.fit_segments import FitSegment, PERIOD, segment_for_fit
 from lg_husky_sim.identification.options import with_effects
-from lg_husky_sim.identification.piece_simulation import simulate_piece
-from lg_husky_sim.identification.pieces import PERIOD, Piece, piece_of
-from lg_husky_sim.identification.tracking import track_of, TrackingObjective
+from lg_husky_sim.identification.paper_objective import PaperObjective, track_of
+from lg_husky_sim.identification.segment_simulation import simulate_segment
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.recording.recording import cut
 from lg_husky_sim.signals import BodyTwist, TimeSeries
@@ -57,18 +57,18 @@ def stint(plant: Plant, forward: float, yaw: float, names: tuple[str, ...] = ALL
         {name: streams[name] for name in ('command', *names)}, *window))
 
 
-def begun(segment: Segment) -> Piece:
-    piece = piece_of(segment)
-    assert piece is not None
-    return piece
+def ready(segment: Segment) -> FitSegment:
+    fitted = segment_for_fit(segment)
+    assert fitted is not None
+    return fitted
 
 
 @pytest.mark.parametrize('names', [ALL, ('imu', 'pose'), ('wheels',)])
 def test_a_dead_time_acts_from_rest_on(names: tuple[str, ...]) -> None:
     """However the recording begins with the first command, as those of a joystick do."""
     _, plant = late_by(0.3)
-    piece = begun(stint(plant, 0.8, 0.0, names))
-    speed = simulate_piece(Simulator(plant, PERIOD), piece)[:, FORWARD]
+    segment = ready(stint(plant, 0.8, 0.0, names))
+    speed = simulate_segment(Simulator(plant, PERIOD), segment)[:, FORWARD]
     assert np.all(speed[:30] == 0.0)
     assert speed[60] > 0.5
 
@@ -76,11 +76,11 @@ def test_a_dead_time_acts_from_rest_on(names: tuple[str, ...]) -> None:
 def test_noise_of_the_pose_is_no_motion_where_wheels_stand_still() -> None:
     """A position that is 9 mm off twice makes such a speed of an increment over 0.2 s."""
     _, plant = late_by(0.3)
-    noisy = replace(begun(stint(plant, 0.8, 0.0)), twist=BodyTwist(0.09, 0.0),
+    noisy = replace(ready(stint(plant, 0.8, 0.0)), twist=BodyTwist(0.09, 0.0),
                     wheel_rates=(0.04, -0.05))
     untold = replace(noisy, commands=TimeSeries(np.zeros(0), np.zeros((0, 2)),
                                                 ('forward', 'yaw')))
-    told, alone = (simulate_piece(Simulator(plant, PERIOD), one) for one in (noisy, untold))
+    told, alone = (simulate_segment(Simulator(plant, PERIOD), one) for one in (noisy, untold))
     np.testing.assert_array_equal(told[:30], alone[:30])
     assert told[60, FORWARD] > alone[60, FORWARD] + 0.4
 
@@ -100,11 +100,11 @@ def test_the_dead_time_of_short_drives_from_rest_is_found(names: tuple[str, ...]
 
 
 @pytest.mark.parametrize('latency', [0.0, 0.2])
-def test_a_piece_in_motion_goes_on(latency: float) -> None:
+def test_a_segment_in_motion_goes_on(latency: float) -> None:
     """By a dead time of the base or one of the recording: the line of commands is full."""
     _, plant = late_by(0.2 - latency)
-    piece = begun(stint(plant, 0.8, 0.0, window=(3.0, 6.0), noise=0.0))
-    speed = simulate_piece(Simulator(plant, PERIOD), piece, latency)[:, FORWARD]
+    segment = ready(stint(plant, 0.8, 0.0, window=(3.0, 6.0), noise=0.0))
+    speed = simulate_segment(Simulator(plant, PERIOD), segment, latency)[:, FORWARD]
     np.testing.assert_allclose(speed, speed[0], atol=2e-3)
 
 
@@ -112,8 +112,8 @@ def test_a_limited_base_in_motion_does_not_ramp_down_to_its_limit() -> None:
     """What it followed before was limited, too."""
     _, plant = late_by(0.1, 'command_limit:forward', 'command_slew', limit_forward=0.4,
                        slew_forward=0.2)
-    piece = begun(stint(plant, 0.9, 0.0, window=(4.0, 7.0), noise=0.0))
-    speed = simulate_piece(Simulator(plant, PERIOD), piece)[:, FORWARD]
+    segment = ready(stint(plant, 0.9, 0.0, window=(4.0, 7.0), noise=0.0))
+    speed = simulate_segment(Simulator(plant, PERIOD), segment)[:, FORWARD]
     np.testing.assert_allclose(speed, speed[0], atol=2e-3)
 
 
@@ -141,7 +141,7 @@ def test_a_start_in_motion_is_the_same_for_one_candidate_and_for_many() -> None:
     husky = load_model()
     compiled = compile_model(husky.structure)
     drive = stint(compiled.at(husky.parameters), 0.8, 0.4, ('pose',), (10.0, 15.0), noise=0.0)
-    objective = TrackingObjective(compiled, husky.parameters, ('wheel_damping',), [drive])
+    objective = PaperObjective(compiled, husky.parameters, ('wheel_damping',), [drive])
     assert objective.batched
     values = np.array([[husky.parameters['wheel_damping']], [10.0]])
     alone = [objective._single(row) for row in values]

@@ -94,9 +94,9 @@ def test_x_and_y_of_a_path_stay_at_the_same_times() -> None:
     assert np.isnan(x.measured).sum() == 1
 
 
-def test_the_stretch_with_the_largest_misfit_is_found() -> None:
-    misfit = np.where((TIMES > 11.0) & (TIMES < 13.0), 1.0, 0.0)
-    start, end = longest_stretch(TIMES, misfit, 4.0)
+def test_the_stretch_with_the_largest_error_is_found() -> None:
+    error = np.where((TIMES > 11.0) & (TIMES < 13.0), 1.0, 0.0)
+    start, end = longest_stretch(TIMES, error, 4.0)
     assert start <= 11.02
     assert end >= 12.98
     assert end - start == pytest.approx(4.0)

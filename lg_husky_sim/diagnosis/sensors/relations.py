@@ -212,7 +212,7 @@ def _relation(parts: Sequence[Segment], quantity: str, names: tuple[str, str],
         return None
     steps = round(reach / setting('late_step'))
     late = min((setting('late_step') * k for k in range(-steps, steps + 1)),
-               key=lambda at: _misfit(windows, at))
+               key=lambda at: _disagreement(windows, at))
     return _refined(windows, late, quantity, names, max(intervals), seconds)
 
 
@@ -245,7 +245,7 @@ def _spread(values: FloatArray) -> float:
     return float(np.median(np.abs(values)) / setting('median_of_normal'))
 
 
-def _misfit(windows: _Windows, late: float) -> float:
+def _disagreement(windows: _Windows, late: float) -> float:
     # Absolute, not squared: jumps of a pose shall not choose the lateness.
     reference, source, span, _, _ = windows.rows(late)
     _, left, _ = _robust(np.column_stack([source, span * windows.offset]), reference)

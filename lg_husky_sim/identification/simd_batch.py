@@ -3,13 +3,14 @@
 """
 Equation (23) for many candidates at once, the objective inside the loop.
 
-Candidates run side by side in lanes of 16, so that one machine instruction serves several of
-them. Where numba is absent the same formulas run on arrays of all candidates.
+Candidates run side by side in the lanes of a batch of 16, so that one machine instruction
+(SIMD) serves several of them. Where numba is absent the same formulas run on arrays of all
+candidates.
 """
 
 from __future__ import annotations
 
-from lg_husky_sim.identification.halves import Halves
+from lg_husky_sim.identification.modal_decoupling import DecoupledModes
 from lg_husky_sim.jit import compiled, jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -21,7 +22,7 @@ IntArray = NDArray[np.int64]
 LANES = 16
 #: Terms of the exponential's series after scaling.
 TERMS = 9
-#: Rows of a half's operator: three states and the integral of the body rate.
+#: Rows of a mode's operator: three states and the integral of the body rate.
 ROWS = 4
 
 
@@ -80,13 +81,13 @@ def _exponentials(maps: FloatArray) -> None:
                 x[i, j] = total[i, j]
 
 
-def operators(halves: Halves, period: float) -> FloatArray:
+def operators(modes: DecoupledModes, period: float) -> FloatArray:
     """
-    Return the exact hold of each half of each candidate.
+    Return the exact hold of each mode of each candidate.
 
     Parameters
     ----------
-    halves : Halves
+    modes : DecoupledModes
         Of n candidates.
     period : float
         Step [s].
@@ -97,10 +98,10 @@ def operators(halves: Halves, period: float) -> FloatArray:
         Columns are the three states and the input; the last row is the integral of the body
         rate over the step (distance, or turn).
     """
-    count = halves.a.shape[0]
+    count = modes.a.shape[0]
     maps = np.zeros((count, 2, ROWS, 4))
-    maps[:, :, :3, :3] = halves.a * period
-    maps[:, :, :3, 3] = halves.b * period
+    maps[:, :, :3, :3] = modes.a * period
+    maps[:, :, :3, 3] = modes.b * period
     maps[:, :, 3, 1] = period
     if compiled():
         _exponentials(maps.reshape(2 * count, ROWS, 4))
@@ -197,8 +198,8 @@ def _blocks(op: FloatArray, stage: FloatArray) -> tuple[FloatArray, FloatArray]:
             np.ascontiguousarray(stages.transpose(1, 0, 2)).reshape(-1, 3 * LANES))
 
 
-def tracking_cost(op: FloatArray, stage: FloatArray, begin: FloatArray, commands: FloatArray,
-                  steps: IntArray, shares: FloatArray, targets: FloatArray) -> FloatArray:
+def batch_cost(op: FloatArray, stage: FloatArray, begin: FloatArray, commands: FloatArray,
+               steps: IntArray, shares: FloatArray, targets: FloatArray) -> FloatArray:
     """
     Return the sum of absolute x and y errors of each candidate, eq. (23).
 
@@ -207,9 +208,9 @@ def tracking_cost(op: FloatArray, stage: FloatArray, begin: FloatArray, commands
     op : numpy.ndarray, shape (2, ROWS, 4, n_candidates)
         Of :func:`operators`.
     stage : numpy.ndarray, shape (n_candidates, 3)
-        Of :class:`Halves`.
+        Of :class:`DecoupledModes`.
     begin : numpy.ndarray, shape (9,)
-        States of both halves, x, y [m] and heading [rad] at the start.
+        States of both modes, x, y [m] and heading [rad] at the start.
     commands : numpy.ndarray, shape (n_steps, 2)
         Forward speed [m/s] and yaw rate [rad/s] over each step.
     steps : numpy.ndarray of int64, shape (n_samples,)

@@ -11,9 +11,9 @@ from lg_husky_sim.errors import FitError, LgHuskyError
 from lg_husky_sim.husky.model import HuskyModel
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.identification.halves import can_split, HalvesMaker
-from lg_husky_sim.identification.lanes import operators, tracking_cost
-from lg_husky_sim.identification.pieces import piece_of
+from lg_husky_sim.identification.fit_segments import segment_for_fit
+from lg_husky_sim.identification.modal_decoupling import can_decouple, ModalDecoupling
+from lg_husky_sim.identification.simd_batch import batch_cost, operators
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose
 from lg_husky_sim.simulation.event_kernel import COLUMNS
@@ -122,13 +122,13 @@ def track_of(segment: Segment, recordings: Sequence[str] = ()) -> Track | None:
     early = pose.slice(start, start + REST)
     moved = np.hypot(np.ptp(early.column('x')), np.ptp(early.column('y')))
     active = commands.slice(-np.inf, start + REST).values
-    first, piece = Pose(*map(float, pose.values[0])), piece_of(segment)
+    first, fitted = Pose(*map(float, pose.values[0])), segment_for_fit(segment)
     twist = BodyTwist()
     rates: tuple[float, float] | None = (0.0, 0.0)
     if not np.any(active) and moved < 0.1:
         # At rest the mean of the first positions, of which each is noisy.
         first = Pose(*(float(np.mean(early.column(n))) for n in ('x', 'y', 'heading')))
-    elif piece is None or not at_rest(piece.twist, piece.wheels_began):
+    elif fitted is None or not at_rest(fitted.twist, fitted.initial_wheel_rates):
         span = max(float(early.times[-1] - start), 1e-3)
         way = early.values[-1] - early.values[0]
         along = way[0] * np.cos(first.heading) + way[1] * np.sin(first.heading)
@@ -145,7 +145,7 @@ def track_of(segment: Segment, recordings: Sequence[str] = ()) -> Track | None:
                  tuple(recordings), commanded_until(start, commands, twist, rates))
 
 
-class TrackingObjective:
+class PaperObjective:
     """
     Eq. (23) as a function of many candidates.
 
@@ -173,12 +173,12 @@ class TrackingObjective:
             raise FitError('the objective of eq. (23) needs a pose and a command; no segment '
                            'has both')
         self.model, self.parameters, self.free = model, parameters, free
-        self._maker = (HalvesMaker(model, parameters, free)
-                       if can_split(model, parameters) else None)
+        self._decoupling = (ModalDecoupling(model, parameters, free)
+                            if can_decouple(model, parameters) else None)
         self._begins = [self._begin(track) for track in self.tracks if self.batched]
 
     def _begin(self, track: Track) -> FloatArray:
-        # The two halves' states at the start: (wheels, body, current) of mean and difference.
+        # States of both modes at the start: (wheels, body, current) of mean and difference.
         # What was not measured is that of the given parameters for all candidates: currents,
         # and wheels that follow their motors, are forgotten within milliseconds.
         plant = self.model.at(self.parameters)
@@ -192,7 +192,7 @@ class TrackingObjective:
     @property
     def batched(self) -> bool:
         """Whether candidates run through the batch kernel."""
-        return self._maker is not None
+        return self._decoupling is not None
 
     @property
     def steps(self) -> int:
@@ -213,14 +213,14 @@ class TrackingObjective:
             [m]; infinite where a candidate cannot be simulated.
         """
         rows = np.atleast_2d(np.asarray(candidates, dtype=np.float64))
-        if self._maker is None:
+        if self._decoupling is None:
             return np.array([self._single(row) for row in rows])
-        halves = self._maker(rows)
-        op = operators(halves, PERIOD)
+        modes = self._decoupling(rows)
+        op = operators(modes, PERIOD)
         cost = np.zeros(len(rows))
         for track, begin in zip(self.tracks, self._begins, strict=True):
-            cost += tracking_cost(op, halves.stage, begin, track.commands, track.steps,
-                                  track.shares, track.targets)
+            cost += batch_cost(op, modes.stage, begin, track.commands, track.steps,
+                               track.shares, track.targets)
         return np.where(np.isfinite(cost), cost, np.inf)
 
     def _single(self, row: FloatArray) -> float:

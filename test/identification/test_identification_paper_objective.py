@@ -10,11 +10,11 @@ from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.model_file import ModelFile
-from lg_husky_sim.identification import lanes
-from lg_husky_sim.identification.halves import can_split, HalvesMaker
+from lg_husky_sim.identification import simd_batch
+from lg_husky_sim.identification.modal_decoupling import can_decouple, ModalDecoupling
 from lg_husky_sim.identification.options import with_effects
+from lg_husky_sim.identification.paper_objective import PaperObjective, PERIOD, track_of
 from lg_husky_sim.identification.problem import observations
-from lg_husky_sim.identification.tracking import PERIOD, track_of, TrackingObjective
 from lg_husky_sim.jit import SWITCH
 from lg_husky_sim.recording import Segment
 import numpy as np
@@ -25,17 +25,17 @@ FREE = ('wheel_damping', 'yaw_damping', 'command_gain')
 DRAWS = np.random.default_rng(7).uniform([1.0, 1.0, 0.75], [100.0, 100.0, 1.0], (40, 3))
 
 
-def maker(husky: ModelFile, free: tuple[str, ...] = FREE) -> HalvesMaker:
-    return HalvesMaker(compile_model(husky.structure), husky.parameters, free)
+def maker(husky: ModelFile, free: tuple[str, ...] = FREE) -> ModalDecoupling:
+    return ModalDecoupling(compile_model(husky.structure), husky.parameters, free)
 
 
 def test_operators_equal_the_matrix_exponential(husky: ModelFile) -> None:
-    halves = maker(husky)(DRAWS)
-    found = lanes.operators(halves, PERIOD)
+    modes = maker(husky)(DRAWS)
+    found = simd_batch.operators(modes, PERIOD)
     for k in (0, 17, 39):
         for half in range(2):
             block = np.zeros((5, 5))
-            block[:3, :3], block[:3, 4] = halves.a[k, half], halves.b[k, half]
+            block[:3, :3], block[:3, 4] = modes.a[k, half], modes.b[k, half]
             block[3, 1] = 1.0
             exact = expm(block * PERIOD)[:4][:, [0, 1, 2, 4]]
             np.testing.assert_allclose(found[half, :, :, k], exact, rtol=1e-9, atol=1e-11)
@@ -45,8 +45,8 @@ def test_halves_have_the_poles_of_the_graph(husky: ModelFile) -> None:
     model = compile_model(husky.structure)
     values = dict(zip(FREE, DRAWS[0], strict=True))
     whole = np.linalg.eigvals(model.at(husky.parameters.replacing(values)).sets[0].a)
-    halves = maker(husky)(DRAWS[:1])
-    split = np.concatenate([np.linalg.eigvals(halves.a[0, half]) for half in range(2)])
+    modes = maker(husky)(DRAWS[:1])
+    split = np.concatenate([np.linalg.eigvals(modes.a[0, half]) for half in range(2)])
     np.testing.assert_allclose(np.sort(split.real), np.sort(whole.real), rtol=1e-9)
 
 
@@ -62,7 +62,7 @@ def test_dampings_are_learnt_as_affine_and_masses_are_not(husky: ModelFile) -> N
 
 def test_batch_equals_the_simulator(husky: ModelFile, circle: Segment) -> None:
     model = compile_model(husky.structure)
-    objective = TrackingObjective(model, husky.parameters, FREE, [circle])
+    objective = PaperObjective(model, husky.parameters, FREE, [circle])
     assert objective.batched
     track = track_of(circle)
     assert track is not None
@@ -75,8 +75,8 @@ def test_batch_equals_the_simulator(husky: ModelFile, circle: Segment) -> None:
 
 
 def test_a_cost_does_not_depend_on_its_company(husky: ModelFile, circle: Segment) -> None:
-    objective = TrackingObjective(compile_model(husky.structure), husky.parameters, FREE,
-                                  [circle])
+    objective = PaperObjective(compile_model(husky.structure), husky.parameters, FREE,
+                               [circle])
     together = objective(DRAWS)
     assert together[23] == objective(DRAWS[23:24])[0]
     assert together.shape == (40,)
@@ -84,8 +84,8 @@ def test_a_cost_does_not_depend_on_its_company(husky: ModelFile, circle: Segment
 
 def test_without_numba_the_numbers_are_the_same(husky: ModelFile, circle: Segment,
                                                 monkeypatch: pytest.MonkeyPatch) -> None:
-    objective = TrackingObjective(compile_model(husky.structure), husky.parameters, FREE,
-                                  [circle])
+    objective = PaperObjective(compile_model(husky.structure), husky.parameters, FREE,
+                               [circle])
     compiled = objective(DRAWS[:6])
     monkeypatch.setenv(SWITCH, '1')
     np.testing.assert_allclose(objective(DRAWS[:6]), compiled, rtol=1e-9)
@@ -98,7 +98,7 @@ def test_positions_between_steps_are_interpolated(husky: ModelFile, circle: Segm
     track = track_of(late)
     assert track is not None
     np.testing.assert_allclose(track.times, late.streams['pose'].times, atol=1e-12)
-    objective = TrackingObjective(compile_model(husky.structure), husky.parameters, (), [late])
+    objective = PaperObjective(compile_model(husky.structure), husky.parameters, (), [late])
     plant = compile_model(husky.structure).at(husky.parameters)
     assert objective(np.zeros((1, 0)))[0] == pytest.approx(
         np.abs(track.simulate(plant) - track.targets).sum(), rel=1e-9)
@@ -107,10 +107,10 @@ def test_positions_between_steps_are_interpolated(husky: ModelFile, circle: Segm
 def test_models_that_do_not_split_run_one_by_one(husky: ModelFile, circle: Segment) -> None:
     lopsided = with_effects(husky, ['viscous_asymmetry:left'])
     model = compile_model(lopsided.structure)
-    assert not can_split(model, lopsided.parameters)
-    assert not can_split(compile_model(Structure(effects=(Effect('command_latency'),))),
-                         with_effects(husky, ['command_latency']).parameters)
-    objective = TrackingObjective(model, lopsided.parameters, FREE, [circle])
+    assert not can_decouple(model, lopsided.parameters)
+    assert not can_decouple(compile_model(Structure(effects=(Effect('command_latency'),))),
+                            with_effects(husky, ['command_latency']).parameters)
+    objective = PaperObjective(model, lopsided.parameters, FREE, [circle])
     assert not objective.batched
     assert np.all(np.isfinite(objective(DRAWS[:2])))
     assert objective(np.array([[-1.0, 1.0, 0.9]]))[0] == np.inf
@@ -119,7 +119,7 @@ def test_models_that_do_not_split_run_one_by_one(husky: ModelFile, circle: Segme
 def test_a_drive_without_pose_has_no_objective(husky: ModelFile, circle: Segment) -> None:
     blind = replace(circle, streams={k: v for k, v in circle.streams.items() if k != 'pose'})
     with pytest.raises(FitError, match='needs a pose'):
-        TrackingObjective(compile_model(husky.structure), husky.parameters, FREE, [blind])
+        PaperObjective(compile_model(husky.structure), husky.parameters, FREE, [blind])
 
 
 def test_an_effect_begins_between_recordings(husky: ModelFile, circle: Segment) -> None:
@@ -141,7 +141,7 @@ def test_an_effect_begins_between_recordings(husky: ModelFile, circle: Segment) 
             assert not np.allclose(predict(late), predict(other))
     # In its own recording from then on, and before it in what stands before it.
     parts = [replace(circle, recording=name) for name in ('zero', 'two')]
-    tracks = TrackingObjective(compile_model(husky.structure), husky.parameters, (), parts).tracks
+    tracks = PaperObjective(compile_model(husky.structure), husky.parameters, (), parts).tracks
     np.testing.assert_array_equal(tracks[0].simulate(late), tracks[0].simulate(never))
     own, early = tracks[1].simulate(late), tracks[1].times < 5.0
     np.testing.assert_allclose(own[early], tracks[1].simulate(never)[early], atol=1e-6)

@@ -25,7 +25,7 @@ from lg_husky_sim.reporting.words import capitalised
 
 
 @dataclass(frozen=True)
-class Misfit:
+class ModelMismatch:
     """
     What is said of a robot that a model does not fit.
 
@@ -48,13 +48,13 @@ class Misfit:
 
 def unsearched(evidence: Evidence, start: Point) -> Search:
     """Return a search that tried nothing: names of effects mean nothing on another robot."""
-    plain = evidence.fit(start, rounds=int(setting('misfit_rounds')))
+    plain = evidence.fit(start, rounds=int(setting('mismatch_rounds')))
     return Search(plain, plain, evidence, (Round(evidence, plain, (), False, 1.0),), ())
 
 
-def misfit(found: Sequence[Difference], search: Search, plain_out: Mapping[str, float],
-           recordings: Sequence[Recording], parts: Sequence[Segment], nominal: ModelFile,
-           faults: Sequence[Fault], pool: ThreadPoolExecutor) -> Misfit:
+def model_mismatch(found: Sequence[Difference], search: Search, plain_out: Mapping[str, float],
+                   recordings: Sequence[Recording], parts: Sequence[Segment], nominal: ModelFile,
+                   faults: Sequence[Fault], pool: ThreadPoolExecutor) -> ModelMismatch:
     """
     Say what differs, with a commercial base tried as one hypothesis.
 
@@ -75,7 +75,7 @@ def misfit(found: Sequence[Difference], search: Search, plain_out: Mapping[str, 
 
     Returns
     -------
-    Misfit
+    ModelMismatch
     """
     first = max(found, key=lambda one: one.certainty)
     base, out, everywhere = None, {}, {}
@@ -96,8 +96,8 @@ def misfit(found: Sequence[Difference], search: Search, plain_out: Mapping[str, 
     finding = Finding('unknown', 'none', first.subsystem, first.elements, first.regime, None, (),
                       0.5 * first.certainty ** 2, math.nan, 1.0, (), text)
     if base is None or not better:
-        return Misfit(finding, None, {}, {})
-    return Misfit(finding, base.model, out, everywhere)
+        return ModelMismatch(finding, None, {}, {})
+    return ModelMismatch(finding, base.model, out, everywhere)
 
 
 def _better(plain: Mapping[str, float], base: Mapping[str, float]) -> bool:

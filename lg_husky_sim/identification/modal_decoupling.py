@@ -1,10 +1,10 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A linear plant with equal sides as two halves, for many candidates of its parameters at once.
+Modal decoupling of a linear plant with equal sides, for many candidates at once.
 
-With equal sides the graph's 6 states split exactly: the mean of both sides drives the forward
-speed, half their difference drives the yaw rate. Each half has three states (wheels, body,
+With equal sides the graph's 6 states decouple exactly: the mean of both sides drives the forward
+speed, half their difference drives the yaw rate. Each mode has three states (wheels, body,
 current), which is what makes a batch cheap: two 3-state holds in place of one of 6 states.
 """
 
@@ -19,10 +19,10 @@ from lg_husky_sim.husky.plant import PlantSet
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Largest coupling between the halves, and largest departure from an affine dependence on the
+#: Largest coupling between the modes, and largest departure from an affine dependence on the
 #: parameters, relative to the largest entry.
 EXACT = 1e-9
-#: Mean and half difference of the two sides, in the order (wheels, body, current) a half.
+#: Mean and half difference of the two sides, in the order (wheels, body, current) a mode.
 _MIX = np.array([[0.5, 0.5, 0.0, 0.0, 0.0, 0.0],
                  [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
                  [0.0, 0.0, 0.0, 0.0, 0.5, 0.5],
@@ -33,9 +33,9 @@ _SIDES = np.array([[1.0, -1.0], [1.0, 1.0]])
 
 
 @dataclass(frozen=True, eq=False)
-class Halves:
+class DecoupledModes:
     """
-    Continuous matrices of the two halves of several candidates.
+    Continuous matrices of the two modes of several candidates.
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ class Halves:
     stage: FloatArray
 
 
-def _split(plant: PlantSet) -> FloatArray | None:
-    # The numbers of one candidate as a flat vector, or None if it does not split.
+def _decoupled(plant: PlantSet) -> FloatArray | None:
+    # The numbers of one candidate as a flat vector, or None if it does not decouple.
     command = plant.command
     limits = (command.slew_forward, command.slew_yaw, command.limit_forward, command.limit_yaw)
     if (plant.a.shape[0] != 6 or plant.laws.size or command.latency
@@ -71,9 +71,9 @@ def _split(plant: PlantSet) -> FloatArray | None:
         [command.volts_per_speed, command.volts_per_rate, command.clamp]])
 
 
-class HalvesMaker:
+class ModalDecoupling:
     """
-    Gives the halves of many candidates.
+    Gives the modes of many candidates.
 
     Where the matrices depend on the free parameters as an affine function (the dampings and the
     command gain do), that function is learnt from the derived graph and evaluated for all
@@ -89,7 +89,7 @@ class HalvesMaker:
     Raises
     ------
     FitError
-        If the model does not split into halves.
+        If the model does not decouple.
     """
 
     def __init__(self, model: HuskyModel, parameters: Parameters, free: tuple[str, ...]) -> None:
@@ -98,7 +98,7 @@ class HalvesMaker:
         centre = np.array([parameters[name] for name in free])
         base = self._one(centre)
         if base is None:
-            raise FitError('the model does not split into two halves: it has unequal sides, '
+            raise FitError('the model does not decouple into two modes: it has unequal sides, '
                            'efforts or a shaped command')
         steps = np.maximum(0.25 * np.abs(centre), 1e-3)
         columns = []
@@ -126,16 +126,16 @@ class HalvesMaker:
 
     def _one(self, values: FloatArray) -> FloatArray | None:
         given = {**self._values, **dict(zip(self.free, map(float, values), strict=True))}
-        return _split(self.model.regimes[0].at(given))
+        return _decoupled(self.model.regimes[0].at(given))
 
     @property
     def affine(self) -> bool:
         """Whether all candidates are made at once."""
         return self._slopes is not None
 
-    def __call__(self, candidates: FloatArray) -> Halves:
+    def __call__(self, candidates: FloatArray) -> DecoupledModes:
         """
-        Return the halves of candidates.
+        Return the modes of candidates.
 
         Parameters
         ----------
@@ -143,12 +143,12 @@ class HalvesMaker:
 
         Returns
         -------
-        Halves
+        DecoupledModes
 
         Raises
         ------
         FitError
-            If a candidate does not split.
+            If a candidate does not decouple.
         """
         if self._slopes is not None:
             # One product and one sum an entry, in a fixed order: the same numbers whatever the
@@ -159,15 +159,16 @@ class HalvesMaker:
         else:
             rows = [self._one(row) for row in candidates]
             if any(row is None for row in rows):
-                raise FitError('a candidate does not split into two halves')
+                raise FitError('a candidate does not decouple into two modes')
             flat = np.array(rows, dtype=np.float64)
         count = len(candidates)
-        return Halves(flat[:, :18].reshape(count, 2, 3, 3), flat[:, 18:24].reshape(count, 2, 3),
-                      np.ascontiguousarray(flat[:, 24:27]))
+        return DecoupledModes(
+            flat[:, :18].reshape(count, 2, 3, 3), flat[:, 18:24].reshape(count, 2, 3),
+            np.ascontiguousarray(flat[:, 24:27]))
 
 
-def can_split(model: HuskyModel, parameters: Parameters) -> bool:
-    """Return whether a model splits into halves at these parameters."""
+def can_decouple(model: HuskyModel, parameters: Parameters) -> bool:
+    """Return whether a model decouples into two modes at these parameters."""
     if len(model.regimes) != 1:
         return False
-    return _split(model.regimes[0].at(dict(parameters))) is not None
+    return _decoupled(model.regimes[0].at(dict(parameters))) is not None

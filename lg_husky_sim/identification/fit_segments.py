@@ -1,7 +1,7 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Recorded segments as pieces to be simulated, with the measurements of each.
+Recorded segments ready for a fit: what is simulated, and what was measured.
 
 Every channel keeps its own stamps. The pose enters as increments over a window, taken in the
 body's frame at mid-heading, so that errors do not accumulate.
@@ -32,7 +32,7 @@ SETTLE_ESTIMATED = EARLY
 FASTEST = 55.0
 #: Channels in the order of the measurement vector.
 CHANNELS = ('wheel_left', 'wheel_right', 'yaw_rate', 'advance', 'turn')
-#: Corrections of the state at the start of a piece: of the base's forward speed [m/s] and yaw
+#: Corrections of the state at the start of a segment: of the base's forward speed [m/s] and yaw
 #: rate [rad/s] and of the wheel rates on the left and on the right [rad/s].
 CORRECTIONS = ('initial_forward', 'initial_yaw', 'initial_left', 'initial_right')
 UNITS = {'wheel_left': 'rad/s', 'wheel_right': 'rad/s', 'yaw_rate': 'rad/s',
@@ -63,7 +63,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class FitSegment:
     """
     A segment, ready to be simulated.
 
@@ -85,8 +85,8 @@ class Piece:
     wheel_rates : tuple of float
     wheel_angles : tuple of float
         Initial angles [rad]; zero where no positions were recorded.
-    told : tuple of bool
-        Whether each number of :attr:`began` was measured at the start.
+    measured : tuple of bool
+        Whether each number of :attr:`initial_state` was measured at the start.
     turned : TimeSeries or None
         Measured wheel angles, for the resets.
     sampled : bool
@@ -104,7 +104,7 @@ class Piece:
     twist: BodyTwist
     wheel_rates: tuple[float, float]
     wheel_angles: tuple[float, float]
-    told: tuple[bool, bool, bool, bool] = (True, True, True, True)
+    measured: tuple[bool, bool, bool, bool] = (True, True, True, True)
     turned: TimeSeries | None = None
     sampled: bool = False
 
@@ -114,25 +114,25 @@ class Piece:
         return f'{self.recording}/{self.index}'
 
     @property
-    def began(self) -> tuple[float, float, float, float]:
+    def initial_state(self) -> tuple[float, float, float, float]:
         """Measured state at the start, in the order of :data:`CORRECTIONS`."""
         return (self.twist.forward, self.twist.yaw, *self.wheel_rates)
 
     @property
-    def wheels_began(self) -> tuple[float, float] | None:
+    def initial_wheel_rates(self) -> tuple[float, float] | None:
         """Measured wheel rates at the start [rad/s]; None where none were."""
-        return self.wheel_rates if self.told[CORRECTIONS.index('initial_left')] else None
+        return self.wheel_rates if self.measured[CORRECTIONS.index('initial_left')] else None
 
 
-def correction_name(piece: Piece, place: int) -> str:
-    """Return the name of a correction of a piece's start, its place in CORRECTIONS given."""
-    return f'{CORRECTIONS[place]}@{piece.name}'
+def correction_name(segment: FitSegment, place: int) -> str:
+    """Return the name of a correction of a segment's start, its place in CORRECTIONS given."""
+    return f'{CORRECTIONS[place]}@{segment.name}'
 
 
-def at_rest(piece: Piece) -> bool:
-    """Return whether a piece is known to begin at rest: by its wheels or its pose."""
-    seen = {channel.name for channel in piece.channels}
-    return not any(piece.began) and bool(seen - {'yaw_rate'})
+def at_rest(segment: FitSegment) -> bool:
+    """Return whether a segment is known to begin at rest: by its wheels or its pose."""
+    seen = {channel.name for channel in segment.channels}
+    return not any(segment.initial_state) and bool(seen - {'yaw_rate'})
 
 
 def _thinned(times: FloatArray) -> slice:
@@ -174,11 +174,11 @@ def _initial(series: TimeSeries | None, names: tuple[str, ...], start: float
     return tuple(float(np.median(values.column(n)[:8])) for n in names)
 
 
-def _tells(series: TimeSeries | None, start: float) -> bool:
+def _measured_at_start(series: TimeSeries | None, start: float) -> bool:
     return series is not None and len(series.slice(start, start + EARLY)) > 0
 
 
-def piece_of(segment: Segment, settle: float = SETTLE) -> Piece | None:
+def segment_for_fit(segment: Segment, settle: float = SETTLE) -> FitSegment | None:
     """
     Prepare a segment.
 
@@ -190,7 +190,7 @@ def piece_of(segment: Segment, settle: float = SETTLE) -> Piece | None:
 
     Returns
     -------
-    Piece or None
+    FitSegment or None
         None if it is too short or has no command or no measurement.
     """
     streams = segment.streams
@@ -201,15 +201,15 @@ def piece_of(segment: Segment, settle: float = SETTLE) -> Piece | None:
     wheels, imu, pose = (streams.get(n) for n in ('wheels', 'imu', 'pose'))
     rates = _initial(wheels, ('left', 'right'), start)
     yaw = _initial(imu, ('yaw_rate',), start)[0]
-    wheels_told, imu_told = (_tells(series, start) for series in (wheels, imu))
+    wheels_measured, imu_measured = (_measured_at_start(series, start) for series in (wheels, imu))
     channels: list[Channel] = []
-    forward, pose_told = 0.0, False
+    forward, pose_measured = 0.0, False
     if pose is not None and len(pose) > 3:
         increments = _increments(pose, start)
         channels.extend(increments)
         if increments and increments[0].values.size:
             forward = float(increments[0].values[0])
-            pose_told = float(increments[0].begins[0]) <= start + EARLY
+            pose_measured = float(increments[0].begins[0]) <= start + EARLY
             yaw = yaw if imu is not None else float(increments[1].values[0])
     still = (starting.at_rest(BodyTwist(forward, yaw))
              and starting.at_rest(BodyTwist(), (rates[0], rates[1])))
@@ -233,12 +233,12 @@ def piece_of(segment: Segment, settle: float = SETTLE) -> Piece | None:
     if angles is not None:
         start_angles = (float(np.interp(start, angles.times, angles.column('left'))),
                         float(np.interp(start, angles.times, angles.column('right'))))
-    return Piece(segment.recording, segment.index, start, count, streams['command'], kept,
-                 pose if pose is not None and len(pose) > 3 else None,
-                 BodyTwist() if still else BodyTwist(forward, yaw),
-                 (0.0, 0.0) if still else (rates[0], rates[1]), start_angles,
-                 (pose_told, imu_told if imu is not None else pose_told, wheels_told,
-                  wheels_told), angles)
+    return FitSegment(segment.recording, segment.index, start, count, streams['command'], kept,
+                      pose if pose is not None and len(pose) > 3 else None,
+                      BodyTwist() if still else BodyTwist(forward, yaw),
+                      (0.0, 0.0) if still else (rates[0], rates[1]), start_angles,
+                      (pose_measured, imu_measured if imu is not None else pose_measured,
+                       wheels_measured, wheels_measured), angles)
 
 
 def _after(channel: Channel, begin: float) -> Channel:

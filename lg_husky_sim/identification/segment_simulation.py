@@ -1,13 +1,13 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Simulate one piece of a recording by its commands, from where it was measured to be."""
+"""Simulate one segment of a recording by its commands, from where it was measured to be."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
 from lg_husky_sim.husky.plant import SensorModel
-from lg_husky_sim.identification.pieces import PERIOD, Piece
+from lg_husky_sim.identification.fit_segments import FitSegment, PERIOD
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation.event_kernel import COLUMNS, run
 from lg_husky_sim.simulation.events import Events
@@ -21,16 +21,16 @@ RESET = 4.0
 ANGLES = [COLUMNS.index('angle_left'), COLUMNS.index('angle_right')]
 
 
-def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
-                   correction: FloatArray | None = None) -> FloatArray:
+def simulate_segment(simulator: Simulator, segment: FitSegment, latency: float = 0.0,
+                     correction: FloatArray | None = None) -> FloatArray:
     """
-    Simulate a piece on its grid.
+    Simulate a segment on its grid.
 
     Parameters
     ----------
     simulator : Simulator
         At :data:`PERIOD`.
-    piece : Piece
+    segment : FitSegment
     latency : float
         Further dead time of the commands [s].
     correction : numpy.ndarray, shape (4,), optional
@@ -44,24 +44,24 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
         onset: it would be out of phase after a few turns otherwise. The angle columns go on
         without a jump.
     """
-    events, before = _events(piece, latency)
-    twist, rates = piece.twist, piece.wheel_rates
+    events, before = _events(segment, latency)
+    twist, rates = segment.twist, segment.wheel_rates
     if correction is not None:
-        forward, yaw, left, right = (float(c) for c in np.add(piece.began, correction))
+        forward, yaw, left, right = (float(c) for c in np.add(segment.initial_state, correction))
         twist, rates = BodyTwist(forward, yaw), (left, right)
     # Whether or not something is known there: steps of the simulation end at the resets.
     stride = max(1, round(RESET / PERIOD))
-    poses = _poses(piece, stride)
-    angles = _angles(piece, stride, simulator.plant.sets[0].sensors)
-    state = simulator.initial(poses[0], twist, piece.start, rates, piece.wheel_angles, before)
+    poses = _poses(segment, stride)
+    angles = _angles(segment, stride, simulator.plant.sets[0].sensors)
+    state = simulator.initial(poses[0], twist, segment.start, rates, segment.wheel_angles, before)
     flat = np.array(state.flat)
-    out = np.empty((piece.count + 1, len(COLUMNS)))
+    out = np.empty((segment.count + 1, len(COLUMNS)))
     out[0] = state.row
     ahead = np.zeros(2)
     longest = max(one.command.latency for one in simulator.plant.sets)
-    for first in range(0, piece.count, stride):
-        last = min(first + stride, piece.count)
-        if piece.pose is not None and first:
+    for first in range(0, segment.count, stride):
+        last = min(first + stride, segment.count)
+        if segment.pose is not None and first:
             now = poses[first // stride]
             flat[state.n + 3:state.n + 6] = now.heading, now.x, now.y
         if angles is not None and first:
@@ -79,47 +79,47 @@ def simulate_piece(simulator: Simulator, piece: Piece, latency: float = 0.0,
 
 
 @lru_cache(maxsize=256)
-def _events(piece: Piece, latency: float) -> tuple[Events, BodyTwist]:
+def _events(segment: FitSegment, latency: float) -> tuple[Events, BodyTwist]:
     # Commands and the grid, and what was commanded until the start. Measured and not corrected
-    # motion tells whether the piece begins at rest: a start that is estimated would switch it
+    # motion tells whether the segment begins at rest: a start that is estimated would switch it
     # over.
-    commands = piece.commands
-    before = commanded_until(piece.start, commands, piece.twist, piece.wheels_began)
+    commands = segment.commands
+    before = commanded_until(segment.start, commands, segment.twist, segment.initial_wheel_rates)
     if latency:
         times, values = commands.times + latency, commands.values
-        if times.size and times[0] > piece.start:
+        if times.size and times[0] > segment.start:
             # Late by the dead time, the commands leave a gap that those before them fill.
-            times = np.insert(times, 0, piece.start)
+            times = np.insert(times, 0, segment.start)
             values = np.insert(values, 0, (before.forward, before.yaw), axis=0)
         commands = TimeSeries(times, values, commands.names)
-    grid = piece.start + PERIOD * np.arange(1, piece.count + 1)
-    return Events(commands, grid, start=piece.start, fresh=True), before
+    grid = segment.start + PERIOD * np.arange(1, segment.count + 1)
+    return Events(commands, grid, start=segment.start, fresh=True), before
 
 
-def _angles(piece: Piece, stride: int, sensors: SensorModel) -> FloatArray | None:
+def _angles(segment: FitSegment, stride: int, sensors: SensorModel) -> FloatArray | None:
     # Wheel angles at the start and at each reset, by what the encoders read; shape (n, 2).
-    if piece.turned is None:
+    if segment.turned is None:
         return None
-    times = _resets(piece, stride) + sensors.delay_wheels
+    times = _resets(segment, stride) + sensors.delay_wheels
     angles = np.empty((times.size, 2))
     for k, (side, factor) in enumerate((('left', sensors.encoder_left),
                                         ('right', sensors.encoder_right))):
-        read = np.interp(times, piece.turned.times, piece.turned.column(side))
-        angles[:, k] = piece.wheel_angles[k] + (read - read[0]) / factor
+        read = np.interp(times, segment.turned.times, segment.turned.column(side))
+        angles[:, k] = segment.wheel_angles[k] + (read - read[0]) / factor
     return angles
 
 
-def _resets(piece: Piece, stride: int) -> FloatArray:
-    steps = np.arange(0, max(piece.count, 1), stride, dtype=np.float64)
-    times: FloatArray = piece.start + steps * PERIOD
+def _resets(segment: FitSegment, stride: int) -> FloatArray:
+    steps = np.arange(0, max(segment.count, 1), stride, dtype=np.float64)
+    times: FloatArray = segment.start + steps * PERIOD
     return times
 
 
 @lru_cache(maxsize=256)
-def _poses(piece: Piece, stride: int) -> tuple[Pose, ...]:
+def _poses(segment: FitSegment, stride: int) -> tuple[Pose, ...]:
     # Measured poses at the start and at each reset.
-    if piece.pose is None:
+    if segment.pose is None:
         return (Pose(),)
-    times = _resets(piece, stride)
-    columns = [np.interp(times, piece.pose.times, piece.pose.values[:, i]) for i in range(3)]
+    times = _resets(segment, stride)
+    columns = [np.interp(times, segment.pose.times, segment.pose.values[:, i]) for i in range(3)]
     return tuple(Pose(*row) for row in np.column_stack(columns).tolist())
