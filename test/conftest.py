@@ -83,6 +83,8 @@ addEventListener('load', async () => {
   seen.alive = document.body.classList.contains('alive');
   seen.size = [document.documentElement.scrollWidth, innerWidth];
   seen.dark = getComputedStyle(document.body).backgroundColor;
+  seen.plots = [...document.querySelectorAll('.js-plotly-plot')].map(
+    (one) => one.getBoundingClientRect().right);
   seen.drawn = ['plot-first', 'plot-signals', 'plot-path'].map(drawn);
   seen.recordings = [...$('recording').options].map((one) => one.text);
   seen.range = range();
@@ -122,9 +124,14 @@ addEventListener('load', async () => {
   await wait(300);
   seen.charts = all('chart').map((one) => (one.data ? one.data.length : 0));
   document.body.dataset.seen = JSON.stringify(seen);
+  parent.postMessage(document.body.dataset.seen, '*');
 });
 """
 """What a reader does with a report, written down in the page itself."""
+FRAME = """<!doctype html><body><iframe src="page.html" style="border: 0; height: 900px; width: {}px">
+</iframe><script>addEventListener('message', (one) => {{ document.body.dataset.seen = one.data; }});
+</script></body>"""
+"""A browser's window is 500 pixels wide at least; what is in a frame is as wide as the frame."""
 
 
 @pytest.fixture(scope='session')
@@ -140,12 +147,13 @@ def visited(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str,
         text = page.read_text(encoding='utf-8')
         script = f'<script>{VISIT}</script></body>'
         (folder / 'page.html').write_text(text.replace('</body>', script), encoding='utf-8')
+        (folder / 'frame.html').write_text(FRAME.format(width), encoding='utf-8')
         ran = subprocess.run([
             browser, '--headless=new', '--no-sandbox', '--disable-gpu', '--hide-scrollbars',
-            f'--user-data-dir={folder / "profile"}', f'--window-size={width},900',
+            f'--user-data-dir={folder / "profile"}', f'--window-size={width + 16},900',
             f'--blink-settings=preferredColorScheme={0 if dark else 1}',
             '--enable-logging=stderr', '--log-level=0', '--virtual-time-budget=60000',
-            '--dump-dom', (folder / 'page.html').as_uri()],
+            '--dump-dom', (folder / 'frame.html').as_uri()],
             capture_output=True, text=True, timeout=600, check=True)
         said = re.findall(r'CONSOLE[^\]]*\] (.*)', ran.stderr)
         assert not said, f'in the console of {page.name}: {said}'

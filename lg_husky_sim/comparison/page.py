@@ -106,7 +106,8 @@ def report_data(
         tables += recording_tables(parts, columns)
     traces = traces_of(parts, columns)
     about = [(named.label, f'`{printable(named.path)}`'
-              + (f', {named.model.about}' if named.model.about else '')) for named in plants]
+              + (f', {named.model.about.rstrip(".")}' if named.model.about else ''))
+             for named in plants]
     about += [(name, 'another recording of the same drive') for name in columns
               if name not in {named.label for named in plants}]
     seconds = sum(segment.duration for segment, _ in parts)

@@ -14,6 +14,8 @@ from lg_husky_sim.reporting.words import number, with_unit
 _STREAMS = {'wheels': 'of the wheels (joint states)', 'imu': 'of the IMU',
             'pose': 'of the pose (tf or odometry)'}
 AMPLITUDE, PHASE = 'amplitude', 'phase'
+#: Ends of the names of a ripple's numbers, and those of its harmonics' amplitudes and phases.
+_HARMONICS = {'': '', '_twice': ' of the second harmonic'}
 #: The number of an effect that says how late stamps are, or how early.
 LATENESS = 'stamp_delay'
 
@@ -31,7 +33,7 @@ def onset_words(onset: Onset | None) -> str:
 
 def sized(numbers: Sequence[Estimate]) -> tuple[Estimate, ...]:
     """
-    Return the numbers of a finding; cosine and sine of a ripple as amplitude and phase.
+    Return the numbers of a finding; cosines and sines of a ripple as amplitudes and phases.
 
     Parameters
     ----------
@@ -43,18 +45,25 @@ def sized(numbers: Sequence[Estimate]) -> tuple[Estimate, ...]:
         Intervals of amplitude and phase by propagation, cosine and sine taken as independent.
     """
     known = {one.name: one for one in numbers}
-    cosine, sine = known.get('ripple_cos'), known.get('ripple_sin')
-    if cosine is None or sine is None:
-        return tuple(numbers)
+    found = list(numbers)
+    for harmonic, words in _HARMONICS.items():
+        cosine, sine = (known.get(f'{part}{harmonic}') for part in ('ripple_cos', 'ripple_sin'))
+        if cosine is not None and sine is not None:
+            place = min(found.index(cosine), found.index(sine))
+            found = [one for one in found if one not in (cosine, sine)]
+            found[place:place] = _polar(cosine, sine, words)
+    return tuple(found)
+
+
+def _polar(cosine: Estimate, sine: Estimate, words: str) -> tuple[Estimate, Estimate]:
     size = math.hypot(cosine.value, sine.value)
     half = [0.5 * (one.high - one.low) for one in (cosine, sine)]
     parts = (cosine.value / size, sine.value / size) if size else (1.0, 0.0)
     wide = math.hypot(parts[0] * half[0], parts[1] * half[1])
     turn = math.hypot(parts[1] * half[0], parts[0] * half[1]) / size if size else math.pi
     angle = math.atan2(sine.value, cosine.value)
-    return (Estimate(AMPLITUDE, size, cosine.unit, max(0.0, size - wide), size + wide),
-            Estimate(PHASE, angle, 'rad', angle - turn, angle + turn),
-            *(one for one in numbers if one not in (cosine, sine)))
+    return (Estimate(f'{AMPLITUDE}{words}', size, cosine.unit, max(0.0, size - wide), size + wide),
+            Estimate(f'{PHASE}{words}', angle, 'rad', angle - turn, angle + turn))
 
 
 def in_words(numbers: Sequence[Estimate]) -> str:

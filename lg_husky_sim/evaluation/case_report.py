@@ -106,8 +106,8 @@ def verdict(result: CaseResult) -> list[str]:
     def worst(label: str) -> float:
         return max(max(drive.bounds(label)) for drive in held)
     if held:
-        said.append('Largest held-out error: ' + ', '.join(
-            f'{label} {worst(label):.3f} m' for label in result.labels) + '.')
+        said.append(f'Largest held-out error, {result.case.name}: ' + '; '.join(
+            f'{worst(label):.3f} m by {label}' for label in result.labels) + '.')
     known = [result.fits[label].values for label in (GENETIC, SQUARES)]
     ratio = [values['yaw_damping'] / values['wheel_damping'] for values in known
              if {'yaw_damping', 'wheel_damping'} <= set(values)]

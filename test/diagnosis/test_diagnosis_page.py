@@ -47,6 +47,18 @@ def test_a_ripple_has_amplitude_and_phase() -> None:
     assert phase.high - phase.low == pytest.approx(2 * 0.2 / 5.0)
 
 
+def test_each_harmonic_of_a_ripple_has_amplitude_and_phase() -> None:
+    twice = _finding('torque_ripple', 'left', *RIPPLE.parameters,
+                     Estimate('ripple_cos_twice', 0.6, 'N·m', 0.5, 0.7),
+                     Estimate('ripple_sin_twice', 0.8, 'N·m', 0.7, 0.9))
+    first, phase, second, other = sized(twice.parameters)
+    assert (first.value, phase.name) == (5.0, 'phase')
+    assert (second.name, second.value) == ('amplitude of the second harmonic', pytest.approx(1.0))
+    assert (other.name, other.unit) == ('phase of the second harmonic', 'rad')
+    assert dict(headline(_diagnosis(Verdict.KNOWN, twice)).facts)['Size'] == (
+        'amplitude 5 N·m (4.8 to 5.2); amplitude of the second harmonic 1 N·m (0.9 to 1.1)')
+
+
 def test_the_first_line_names_effect_and_side() -> None:
     said = headline(_diagnosis(Verdict.KNOWN, RIPPLE))
     assert said.text == 'Missing effect found: torque ripple, left side'

@@ -96,7 +96,7 @@ def test_recordings_are_evaluated_with_a_rival(tmp_path: Path, evaluated: Path,
     assert held['manoeuvre'] == 's_bend'
     assert max(held['bounds']['LG, least squares']) < 0.01
     assert max(held['bounds']['rival']) > 0.1
-    assert 'Largest held-out error' in capsys.readouterr().out
+    assert f'Largest held-out error, {case["case"]}: ' in capsys.readouterr().out
 
 
 def test_the_engine_turns_less_on_grippy_ground_and_weighs_what_it_should() -> None:

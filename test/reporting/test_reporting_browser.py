@@ -104,11 +104,9 @@ def test_the_path_is_coloured_by_the_error_of_the_chosen_model(seen: dict[str, A
 
 
 @pytest.mark.parametrize('dark', [False, True])
-def test_a_page_fits_a_narrow_screen_in_light_and_dark(dark: bool, page: Path, visited: Visited
-                                                       ) -> None:
-    """No narrower than a browser's window can be."""
+def test_a_page_fits_a_phone_in_light_and_dark(dark: bool, page: Path, visited: Visited) -> None:
     seen = visited(page, width=390, dark=dark)
-    assert seen['size'][1] <= 500
-    assert seen['size'][0] <= seen['size'][1]
+    assert seen['size'] == [390, 390]
+    assert max(seen['plots']) <= 390.0  # a plot is drawn for the screen that it is on
     shade = [int(part) for part in seen['dark'].strip('rgb()').split(',')[:3]]
     assert max(shade) < 64 if dark else min(shade) > 192
