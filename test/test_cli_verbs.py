@@ -77,7 +77,7 @@ def test_manoeuvres_and_parameters_are_listed(tmp_path: Path) -> None:
 def test_info_says_what_a_bag_is_good_for(drive: str) -> None:
     said = run('info', drive)
     assert said.exit_code == 0
-    assert 'Enough for diagnose.' in said.output
+    assert 'Enough for a diagnosis.' in said.output
     (data,) = json.loads(run('info', drive, '--json').stdout)
     assert data['enough_for_diagnose'] is True
     assert {row['stream'] for row in data['streams']} >= {'command', 'wheels', 'imu', 'pose'}

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 import sys
+from typing import Any
 
 from jupyter_client.manager import KernelManager
 from nbclient import NotebookClient
@@ -19,15 +20,14 @@ NOTEBOOKS = sorted((ROOT / 'examples' / 'notebooks').glob('*.ipynb'))
 PATIENCE = 300
 
 
-def test_there_are_five() -> None:
-    assert len(NOTEBOOKS) == 5
+def test_each_has_a_row_on_its_page() -> None:
+    assert len(NOTEBOOKS) == 6
     page = (ROOT / 'docs' / 'notebooks.md').read_text(encoding='utf-8')
     assert all(path.name in page for path in NOTEBOOKS)
 
 
-@pytest.mark.parametrize('path', NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_runs_and_shows_results(
-        path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def executed(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return a notebook with its outputs, run in a folder."""
     monkeypatch.setenv('PYTHONPATH', f'{ROOT}{os.pathsep}{os.environ.get("PYTHONPATH", "")}')
     monkeypatch.setenv('OMP_NUM_THREADS', '1')
     notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
@@ -36,13 +36,35 @@ def test_notebook_runs_and_shows_results(
     manager.kernel_spec.argv[0] = sys.executable  # type: ignore[union-attr]
     try:
         NotebookClient(notebook, km=manager, timeout=PATIENCE,
-                       resources={'metadata': {'path': str(tmp_path)}}).execute()
+                       resources={'metadata': {'path': str(folder)}}).execute()
     finally:
         manager.shutdown_kernel(now=True)
+    return notebook
+
+
+@pytest.mark.parametrize('path', NOTEBOOKS[1:], ids=lambda path: path.stem)
+def test_notebook_runs_and_shows_results(
+        path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    notebook = executed(path, tmp_path, monkeypatch)
     shown = [output for cell in notebook.cells if cell.cell_type == 'code'
              for output in cell.outputs if output.output_type in ('execute_result',
                                                                   'display_data')]
     assert len(shown) >= 4
+
+
+def test_ten_lines_lead_from_a_bag_to_a_named_effect(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    notebook = executed(NOTEBOOKS[0], tmp_path, monkeypatch)
+    cells = [cell for cell in notebook.cells if cell.cell_type == 'code']
+    lines = [line for cell in cells for line in cell.source.splitlines() if line.strip()]
+    assert len(lines) <= 10
+    html = [output.data.get('text/html', '') for cell in cells for output in cell.outputs
+            if output.output_type == 'execute_result']
+    assert any('Enough for a diagnosis' in one for one in html)
+    assert any('Missing effect found: Coulomb friction, left side' in one for one in html)
+    assert any('image/png' in output.get('data', {}) for output in cells[3].outputs)
+    page = (tmp_path / 'found' / 'report.html').read_text(encoding='utf-8')
+    assert 'What to change' in page
 
 
 @pytest.mark.parametrize('path', NOTEBOOKS, ids=lambda path: path.stem)

@@ -114,7 +114,7 @@ def test_the_wheel_simulates_reads_and_compares_away_from_the_source(
                           capture_output=True, timeout=120, check=False,
                           env={**os.environ, SWITCH: '1'})
     assert done.returncode == 0, done.stderr[-2000:]
-    assert done.stdout.startswith('Not enough for diagnose.')  # nine seconds straight ahead
+    assert done.stdout.startswith('Not enough for a diagnosis.')  # nine seconds straight ahead
     assert (tmp_path / 'out' / 'index.html').is_file()
 
 

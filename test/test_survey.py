@@ -35,7 +35,7 @@ def test_a_whole_drive_is_enough_and_nothing_is_wrong(drive: lg.Recording) -> No
     survey = drive.info()
     assert survey.enough
     assert survey.warnings == ()
-    assert survey.verdict == 'Enough for diagnose.'
+    assert survey.verdict == 'Enough for a diagnosis.'
     assert {row[0] for row in survey.streams.rows} >= {'command', 'wheels', 'imu', 'pose'}
     assert str(survey).count('\n') > 10
 
@@ -69,7 +69,7 @@ def test_without_commands_or_measurements_the_survey_says_what_is_missing(
     assert said.missing[0].startswith('velocity commands')
     only = replace(drive, streams={'command': drive.command}).info()
     assert only.missing[0].startswith('a measurement')
-    assert only.verdict == 'Not enough for diagnose.'
+    assert only.verdict == 'Not enough for a diagnosis.'
 
 
 def test_a_drive_that_hardly_moves_is_not_enough() -> None:

@@ -90,9 +90,9 @@ class Survey:
     def verdict(self) -> str:
         """What the recording is good for, in one sentence."""
         if self.enough and not self.warnings:
-            return 'Enough for diagnose.'
-        return 'Enough for diagnose, with reservations.' if self.enough else (
-            'Not enough for diagnose.')
+            return 'Enough for a diagnosis.'
+        return 'Enough for a diagnosis, with reservations.' if self.enough else (
+            'Not enough for a diagnosis.')
 
     def tables(self) -> tuple[Table, ...]:
         """Return the tables that have rows."""

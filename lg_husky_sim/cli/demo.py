@@ -57,7 +57,7 @@ def command(out: Path, manoeuvre: str, model: str) -> None:
         drive = read_drive(made / 'bag', f'/{settings.command_topic}',
                            f'/{settings.ground_truth_topic}', f'/{settings.odometry_topic}')
         save_picture(drive, made / 'picture.png',
-                     f'Live node in a ROS 2 graph: {script.name} ({script.about})')
+                     f'Live node in a ROS 2 graph, {script.name}: {script.about}')
         lines = [
             f'manoeuvre        {script.name}: {script.about}',
             f'model            {model or "packaged Husky, parameters of the paper"}',

@@ -42,14 +42,30 @@ RESPONSES = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate')
 LONGEST = 60.0
 
 
-def png(figure: Figure) -> bytes:
-    """Return a figure as PNG, the same bytes for the same figure."""
+def png(figure: Figure, about: Mapping[str, str] | None = None) -> bytes:
+    """
+    Return a figure as PNG, the same bytes for the same figure.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    about : mapping of str to str, optional
+        What the file says of itself, by the keywords of the PNG specification (``Title``,
+        ``Description``, ``Source``, ``Software``). A picture on its own tells what it shows.
+
+    Returns
+    -------
+    bytes
+    """
     from PIL import Image
-    drawn, stream = BytesIO(), BytesIO()
+    from PIL.PngImagePlugin import PngInfo
+    drawn, stream, text = BytesIO(), BytesIO(), PngInfo()
+    for key, value in (about or {}).items():
+        text.add_itxt(key, value)
     figure.savefig(drawn, format='png', dpi=DOTS)
     # Lines on white need few colours, and a third of the bytes.
     Image.open(drawn).convert('RGB').quantize(COLOURS, dither=Image.Dither.NONE).save(
-        stream, format='png', optimize=True)
+        stream, format='png', optimize=True, pnginfo=text)
     return stream.getvalue()
 
 

@@ -167,13 +167,28 @@ def drawn(data: ReportData, pictured: int = MOST_PICTURED,
     for name, (caption, draw) in _jobs(data, pictured).items():
         captions[name] = caption
         try:
-            images[name] = png(draw())
+            images[name] = png(draw(), _about(data, caption))
         except Exception as error:  # a picture is worth less than the answer beside it
             failures.append(f'The picture {name}.png could not be drawn: '
                             f'{type(error).__name__}: {error}.')
         if on_progress is not None:
             on_progress()
     return images, captions, failures
+
+
+def _about(data: ReportData, caption: str) -> dict[str, str]:
+    """Return what a picture's file says of itself: what it shows, the answer, its command."""
+    head, errors = data.headline, []
+    for table in data.errors:
+        for row in table.rows:
+            values = ', '.join(f'{column} {row.values[column]:.4g}' for column in table.columns
+                               if column in row.values)
+            errors.append(f'{table.title}, {row.name}: {values}')
+    lines = (head.text, *(f'{name}: {value}' for name, value in head.facts), *head.sentences,
+             *head.warnings, *errors)
+    known = {'Title': caption, 'Description': '\n'.join(lines), 'Source': data.provenance.command,
+             'Software': f'lg_husky_sim {data.provenance.version}'.strip()}
+    return {key: value for key, value in known.items() if value}
 
 
 def _jobs(data: ReportData, pictured: int) -> Mapping[str, tuple[str, Callable[[], Figure]]]:

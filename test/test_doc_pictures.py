@@ -1,0 +1,138 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of the docs are those of today: drawn anew, or with the figures that the text gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+import shutil
+
+from click.testing import CliRunner
+from lg_husky_sim.cli.main import cli
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+import pytest
+
+pytest.importorskip('matplotlib', reason='pictures need matplotlib (the extra "plot")')
+from PIL import Image  # noqa: I100 - comes with matplotlib
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / 'docs'
+PICTURES = DOCS / 'pictures'
+#: Side of the blocks whose means are compared [pixels], and the largest difference in grey
+#: levels of 255: letters of another version of matplotlib move by a pixel, bars by more.
+BLOCK, ALIKE = 16, 30.0
+
+
+def blocks(path: Path) -> FloatArray:
+    """Return the mean grey of each block of a picture."""
+    grey = np.asarray(Image.open(path).convert('L'), dtype=np.float64)
+    rows, columns = (size // BLOCK * BLOCK for size in grey.shape)
+    parts = grey[:rows, :columns].reshape(rows // BLOCK, BLOCK, columns // BLOCK, BLOCK)
+    means: FloatArray = parts.mean(axis=(1, 3))
+    return means
+
+
+def texts(svg: Path) -> list[str]:
+    """Return all texts of a picture."""
+    return sorted(re.findall(r'<text[^>]*>([^<]+)</text>', svg.read_text(encoding='utf-8')))
+
+
+def said(name: str) -> str:
+    """Return what a picture's file says of itself."""
+    picture = Image.open(PICTURES / name)
+    assert isinstance(picture.info.get('Description'), str), f'{name} is of an old version'
+    return str(picture.info['Description'])
+
+
+def passage(page: Path, first: str, last: str) -> str:
+    """Return the text of a page from one place to another."""
+    text = page.read_text(encoding='utf-8')
+    return text[text.index(first):text.index(last, text.index(first))]
+
+
+@pytest.fixture(scope='module')
+def proof(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make the page of the blind trial from its outcomes, as it says itself."""
+    folder = tmp_path_factory.mktemp('proof') / 'docs'
+    folder.mkdir()
+    sources = [folder / name for name in ('proof_report.jsonl', 'proof_validation.jsonl')]
+    for source in sources:
+        shutil.copy(DOCS / source.name, source)
+    result = CliRunner().invoke(cli, ['prove', *(word for source in sources
+                                                 for word in ('--from', str(source))),
+                                      '--page', str(folder / 'proof.md')])
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def test_the_page_of_the_blind_trial_is_that_of_its_outcomes(proof: Path) -> None:
+    made = (proof / 'proof.md').read_text(encoding='utf-8')
+    for name in ('proof_report', 'proof_validation'):
+        made = made.replace((proof / name).as_posix(), f'docs/{name}')
+    assert (DOCS / 'proof.md').read_text(encoding='utf-8') == made
+
+
+@pytest.mark.parametrize('name', ['proof_rates', 'proof_reliability', 'proof_confusion'])
+def test_pictures_of_the_blind_trial_are_those_of_its_outcomes(proof: Path, name: str) -> None:
+    ours, made = blocks(PICTURES / f'{name}.png'), blocks(proof / 'pictures' / f'{name}.png')
+    assert ours.shape == made.shape
+    assert np.abs(ours - made).max() < ALIKE
+
+
+def test_the_picture_of_the_graph_is_that_of_todays_graph(tmp_path: Path) -> None:
+    result = CliRunner().invoke(cli, ['derive', '--picture', str(tmp_path / 'husky.svg')])
+    assert result.exit_code == 0, result.output
+    assert len(texts(tmp_path / 'husky.svg')) > 20
+    assert texts(PICTURES / 'husky_graph.svg') == texts(tmp_path / 'husky.svg')
+
+
+@pytest.mark.parametrize(('page', 'first', 'last'), [
+    ('README.md', 'The finding: its', 'Clearpath'),
+    ('docs/real_recordings.md', 'that\n\n- the base', 'It also notes'),
+])
+def test_text_and_picture_of_the_real_diagnosis_give_the_same_figures(
+        page: str, first: str, last: str) -> None:
+    figures = re.findall(r'\d+\.\d+', passage(ROOT / page, first, last))
+    figures = [figure for figure in figures if figure != '1.0']  # Clearpath's own
+    assert len(figures) >= 2
+    description = said('diagnosis.png')
+    known = {f'{float(number):.3g}' for number in re.findall(r'\d+(?:\.\d+)?', description)}
+    assert {f'{float(figure):.3g}' for figure in figures} <= known
+
+
+def test_the_table_of_the_real_diagnosis_is_that_of_its_picture() -> None:
+    page = passage(DOCS / 'real_recordings.md', '| root mean square error, second', 'There the')
+    rows = re.findall(r'^\| .+? \| \**([\d.]+)\** \| \**([\d.]+)\** \|$', page, re.MULTILINE)
+    assert len(rows) == 5
+    held = re.findall(r'^Held-out data, .+ recalibrated ([\d.]+), with finding ([\d.]+)$',
+                      said('diagnosis.png'), re.MULTILINE)
+    known = {tuple(f'{float(value):.3g}' for value in row) for row in held}
+    assert {tuple(f'{float(value):.3g}' for value in row) for row in rows} <= known
+
+
+@pytest.mark.parametrize('name', ['compare_tile_responses.png', 'compare_tile_trajectory.png'])
+def test_table_and_pictures_of_the_comparison_give_the_same_figures(name: str) -> None:
+    rows = passage(DOCS / 'simulate_and_compare.md', '| wheel rate [rad/s] | 2.', '| position, with')
+    table = re.findall(r'^\| (.+?) \| ([\d.]+) \| ([\d.]+) \|', rows, re.MULTILINE)
+    assert len(table) == 4
+    description = said(name)
+    for quantity, grass, tile in table:
+        for recording, figure in (('husky_wet_grass', grass), ('husky_deflated_tile', tile)):
+            found = re.search(rf'^{recording}, {re.escape(quantity)}: paper ([\d.]+)$',
+                              description, re.MULTILINE)
+            assert found, quantity
+            assert float(f'{float(found[1]):.{len(figure.replace(".", "").lstrip("0"))}g}') == (
+                float(figure)), (recording, quantity)
+
+
+def test_each_picture_stands_on_a_page_with_its_command() -> None:
+    pages = {page: page.read_text(encoding='utf-8') for page in DOCS.glob('*.md')}
+    for picture in PICTURES.iterdir():
+        assert any(f'pictures/{picture.name}' in text for text in pages.values()), picture.name
+    source = {name: Image.open(PICTURES / name).info.get('Source', '') for name in (
+        'diagnosis.png', 'compare_tile_responses.png', 'compare_tile_trajectory.png')}
+    assert source['diagnosis.png'].startswith('lg_husky diagnose husky_wet_grass')
+    assert source['compare_tile_responses.png'] == source['compare_tile_trajectory.png'] == (
+        'lg_husky compare husky_wet_grass husky_deflated_tile --out result')
