@@ -128,8 +128,9 @@ addEventListener('load', async () => {
 });
 """
 """What a reader does with a report, written down in the page itself."""
-FRAME = """<!doctype html><body><iframe src="page.html" style="border: 0; height: 900px; width: {}px">
-</iframe><script>addEventListener('message', (one) => {{ document.body.dataset.seen = one.data; }});
+FRAME = """<!doctype html><body>
+<iframe src="page.html" style="border: 0; height: 900px; width: {}px"></iframe>
+<script>addEventListener('message', (one) => {{ document.body.dataset.seen = one.data; }});
 </script></body>"""
 """A browser's window is 500 pixels wide at least; what is in a frame is as wide as the frame."""
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='pictures need matplotlib (the extra "plot")')
-from PIL import Image  # noqa: I100 - comes with matplotlib
+Image = pytest.importorskip('PIL.Image')  # comes with matplotlib
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / 'docs'
@@ -114,7 +114,8 @@ def test_the_table_of_the_real_diagnosis_is_that_of_its_picture() -> None:
 
 @pytest.mark.parametrize('name', ['compare_tile_responses.png', 'compare_tile_trajectory.png'])
 def test_table_and_pictures_of_the_comparison_give_the_same_figures(name: str) -> None:
-    rows = passage(DOCS / 'simulate_and_compare.md', '| wheel rate [rad/s] | 2.', '| position, with')
+    rows = passage(DOCS / 'simulate_and_compare.md', '| wheel rate [rad/s] | 2.',
+                   '| position, with')
     table = re.findall(r'^\| (.+?) \| ([\d.]+) \| ([\d.]+) \|', rows, re.MULTILINE)
     assert len(table) == 4
     description = said(name)

@@ -112,7 +112,8 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
 
 def _facts(finding: Finding, several: bool, changed: bool) -> tuple[tuple[str, str], ...]:
     # The phase of a ripple says where on the wheel, not how large.
-    sizes = [size_words(one) for one in sized(finding.parameters) if not one.name.startswith(PHASE)]
+    sizes = [size_words(one) for one in sized(finding.parameters)
+             if not one.name.startswith(PHASE)]
     words = '; '.join(sizes) or '–'
     if several:
         return ((f'Size of {effect_words(finding)}', words),)

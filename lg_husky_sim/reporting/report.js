@@ -64,7 +64,7 @@
     const count = panels.length, figure = { data: [], layout: base(height) };
     const gap = 24 / (height - 46);
     // Many names reach below the buttons at the right: these get a line of their own.
-    figure.layout.margin.t = 28 + (data.columns.length > 4 && !narrow() ? 26 : 0);
+    figure.layout.margin.t = 28 + (data.columns.length > 4 && !narrow() ? 44 : 0);
     figure.layout.legend.y = 1.0 + gap;
     const size = (1 - gap * (count - 1)) / count;
     figure.layout.xaxis = axis({ title: { text: 'time [s]' }, anchor: `y${count === 1 ? '' : count}`,

@@ -53,7 +53,8 @@ def test_each_harmonic_of_a_ripple_has_amplitude_and_phase() -> None:
                      Estimate('ripple_sin_twice', 0.8, 'N·m', 0.7, 0.9))
     first, phase, second, other = sized(twice.parameters)
     assert (first.value, phase.name) == (5.0, 'phase')
-    assert (second.name, second.value) == ('amplitude of the second harmonic', pytest.approx(1.0))
+    assert second.name == 'amplitude of the second harmonic'
+    assert second.value == pytest.approx(1.0)
     assert (other.name, other.unit) == ('phase of the second harmonic', 'rad')
     assert dict(headline(_diagnosis(Verdict.KNOWN, twice)).facts)['Size'] == (
         'amplitude 5 N·m (4.8 to 5.2); amplitude of the second harmonic 1 N·m (0.9 to 1.1)')
