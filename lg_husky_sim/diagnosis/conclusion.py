@@ -284,7 +284,7 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     second = max((t.score for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id
                   and not is_negligible(t, first.evidence.noise.values)), default=0.0)
     features = Features(best.gain, 1.0 - max(second, 0.0) / max(best.score, 1e-9),
-                        explained / max(_explained(search), best.gain), first.chance)
+                        explained / max(explained_by(search), best.gain), first.chance)
     is_unknown = is_left and features.share > setting('unknown_share')
     return _sure(Verdict.UNKNOWN if is_unknown else Verdict.KNOWN, features)
 
@@ -293,16 +293,29 @@ def _sure(verdict: Verdict, features: Features) -> Answer:
     return Answer(verdict, confidence(verdict, features), features)
 
 
-def _explained(search: Search) -> float:
-    # What the adopted effects gain under the noise that remains with them, over the robot as it
-    # may be: numbers beyond all tolerances would do the effect's work.
+def explained_by(search: Search) -> float:
+    """
+    Return what the adopted effects explain.
+
+    Parameters
+    ----------
+    search : Search
+
+    Returns
+    -------
+    float
+        What they gain under the noise that remains with them [nats], over the robot as it may be:
+        its numbers stay within the tolerances beyond which a report says so, where they would do
+        the effect's work.
+    """
     evidence, plain = search.evidence, search.plain.point
     room = setting('most_tolerances')
-    if np.any(np.abs(plain.prior_residuals) > room):
-        held = tuple(replace(u, lower=max(u.lower, u.centre - room * u.deviation),
-                             upper=min(u.upper, u.centre + room * u.deviation))
-                     for u in plain.unknowns)
-        plain = evidence.fit(replace(plain, unknowns=held).at(plain.places)).point
+    held = tuple(u if u.kind != 'model' else replace(
+        u, lower=max(u.lower, u.centre - room * u.deviation),
+        upper=min(u.upper, u.centre + room * u.deviation)) for u in plain.unknowns)
+    inside = replace(plain, unknowns=held).at(plain.places)
+    if not np.array_equal(inside.places, plain.places):
+        plain = evidence.fit(inside).point
     return (evidence.cost(evidence.residuals(evidence.predict(plain)), plain)
             - search.final.cost)
 

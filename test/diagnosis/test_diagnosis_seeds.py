@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis.conclusion import explained_by
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit, Point
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -21,6 +22,7 @@ from lg_husky_sim.diagnosis.selection.screening import look
 from lg_husky_sim.diagnosis.selection.search import (
     Logged,
     read_anew,
+    Search,
     search,
     seeds_of,
 )
@@ -42,11 +44,18 @@ def _begun(recording: Recording, pool: ThreadPoolExecutor) -> tuple[Evidence, Po
     return evidence_of(drives, [recording.name], start, first_guess(drives), pool), start
 
 
-def _seeded(recording: Recording) -> tuple[Fit, list[Tried]]:
+@pytest.fixture
+def threads() -> Iterator[ThreadPoolExecutor]:
+    """Return one thread."""
     with ThreadPoolExecutor(1) as pool:
-        first, start = _begun(recording, pool)
-        _, base = calibrated(first, start, 1)
-        return base, seeds_of(first, first.fit(start, rounds=1), base, Logged(base))
+        yield pool
+
+
+def _seeded(recording: Recording, pool: ThreadPoolExecutor
+            ) -> tuple[Fit, list[Tried]]:
+    first, start = _begun(recording, pool)
+    _, base = calibrated(first, start, 1)
+    return base, seeds_of(first, first.fit(start, rounds=1), base, Logged(base))
 
 
 def _with_loop(sizes: dict[str, float]) -> Plant:
@@ -56,40 +65,45 @@ def _with_loop(sizes: dict[str, float]) -> Plant:
 
 
 def test_a_speed_loop_is_a_seed_where_the_numbers_of_the_robot_took_its_place(
-        record: Recorded, steps: Steps) -> None:
+        record: Recorded, steps: Steps, threads: ThreadPoolExecutor) -> None:
     plant = _with_loop({'loop_lag': 0.3, 'loop_gain': 1.0, 'loop_integral': 10.0})
-    base, seeds = _seeded(record('loop', plant, steps, 1))
+    base, seeds = _seeded(record('loop', plant, steps, 1), threads)
     assert max(abs(base.point.prior_residuals)) > 5.0
     assert [one.hypothesis.effect.id for one in seeds] == ['speed_loop']
     assert seeds[0].gain > 100.0
     assert max(abs(seeds[0].fit.point.prior_residuals)) < max(abs(base.point.prior_residuals))
 
 
-def test_a_robot_within_its_tolerances_has_no_seeds(record: Recorded, steps: Steps) -> None:
+def test_a_robot_within_its_tolerances_has_no_seeds(
+        record: Recorded, steps: Steps, threads: ThreadPoolExecutor) -> None:
     model = load_model()
     plant = compile_model(model.structure).at(model.parameters)
-    assert _seeded(record('clean', plant, steps, 1))[1] == []
+    assert _seeded(record('clean', plant, steps, 1), threads)[1] == []
 
 
-def test_each_early_effect_is_read_anew(record: Recorded, steps: Steps) -> None:
+def test_each_early_effect_is_read_anew(
+        record: Recorded, steps: Steps, threads: ThreadPoolExecutor) -> None:
     plant = _with_loop({'loop_lag': 0.45, 'loop_gain': 2.0, 'loop_integral': 10.0})
-    with ThreadPoolExecutor(1) as pool:
-        first, start = _begun(record('loop', plant, steps, 1), pool)
-        rough = first.fit(start, rounds=1)
-        pool_of = [h for h in hypotheses(start.structure)
-                   if h.label in ('speed_loop', 'payload:ground')]
-        early = fitted(first, rough, look(first, rough, pool_of), [rough.point], whole=False)
-        assert len(early) == 2
-        found = read_anew(first, rough, early[::-1])
-        assert found is not None
-        assert read_anew(first, rough, ()) is None
-        _, hypothesis, point = found
-        cost = first.cost(first.residuals(first.predict(point)), point)
-        read = {t.hypothesis.label: best_reading(first, t.fit) for t in early}
+    first, start = _begun(record('loop', plant, steps, 1), threads)
+    rough = first.fit(start, rounds=1)
+    pool_of = [h for h in hypotheses(start.structure)
+               if h.label in ('speed_loop', 'payload:ground')]
+    early = fitted(first, rough, look(first, rough, pool_of), [rough.point], whole=False)
+    assert len(early) == 2
+    found = read_anew(first, rough, early[::-1])
+    assert found is not None
+    assert read_anew(first, rough, ()) is None
+    _, hypothesis, point = found
+    cost = first.cost(first.residuals(first.predict(point)), point)
+    read = {t.hypothesis.label: best_reading(first, t.fit) for t in early}
     assert hypothesis.label == 'speed_loop'
     assert point.reading == read['speed_loop'].point.reading != rough.point.reading
     assert [u.name for u in point.unknowns[-3:]] == [p.name for p in hypothesis.free]
     assert cost == pytest.approx(min(one.cost for one in read.values()))
+    # What it explains is counted against a robot as it may be, with the likeliest reading.
+    plain, loop = best_reading(first, rough), read['speed_loop']
+    whole = Search(plain, loop, first, (), (hypothesis,))
+    assert explained_by(whole) > 1.1 * (plain.cost - loop.cost)
 
 
 def test_a_reading_that_came_with_a_seed_goes_with_it(
