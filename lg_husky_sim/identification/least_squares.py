@@ -153,16 +153,16 @@ class Problem:
         key = (*inner.values(), latency)
         starts = self.observations.corrections(extra)
         kept = self._simulated if self._simulated and self._simulated.key == key else None
-        if kept is None:
-            try:
+        try:
+            if kept is None:
                 plant = self.model.at(self.parameters.replacing(inner))
-            except (ParameterError, ArithmeticError, np.linalg.LinAlgError):
-                return None
-            self._simulated = _Simulated(
-                key, plant, starts, self.observations.simulate(plant, latency, starts))
-        elif starts is not None and kept.starts is not None:
-            self._simulated = replace(kept, starts=starts, grids=self.observations.simulate(
-                kept.plant, latency, starts, (kept.starts, kept.grids)))
+                self._simulated = _Simulated(
+                    key, plant, starts, self.observations.simulate(plant, latency, starts))
+            elif starts is not None and kept.starts is not None:
+                self._simulated = replace(kept, starts=starts, grids=self.observations.simulate(
+                    kept.plant, latency, starts, (kept.starts, kept.grids)))
+        except (ParameterError, ArithmeticError, np.linalg.LinAlgError):
+            return None
         assert self._simulated is not None
         predicted = self.observations.observe(
             self._simulated.plant, self._simulated.grids, extra)

@@ -71,6 +71,7 @@ from lg_husky_sim.simulation.command_kernel import APART, next_event
 from lg_husky_sim.simulation.effort_kernel import bend, efforts_at, solve
 from lg_husky_sim.simulation.modal_kernel import rate_of
 from lg_husky_sim.simulation.reading_kernel import go, go_by_arc, read, write_row
+from lg_husky_sim.simulation.runaway import refuse_runaway, RUNAWAY
 import numpy as np
 from numpy.typing import NDArray
 
@@ -207,7 +208,7 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
     Returns
     -------
     int
-        Steps taken.
+        Steps taken; -1 where the model runs away, see :mod:`lg_husky_sim.simulation.runaway`.
     """
     n, size = plant.bases.shape[2], plant.bases.shape[3]
     modes, efforts, lanes, few = work.modes, work.efforts, work.lanes, work.few
@@ -341,6 +342,9 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
                 g += 1
             if tau >= h:
                 break
+        if not (abs(few[LAST, 0]) < RUNAWAY and abs(few[LAST, 1]) < RUNAWAY):
+            # Ever shorter steps would never get there.
+            return -1
         for i in range(n):
             modes[XI, i] = lanes[INTEGRALS + n + i, g]
         for i in range(4):
@@ -369,5 +373,7 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
 def run(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray,
         places: NDArray[np.int64], out: FloatArray, end: float, fine: bool, plant: Packed) -> int:
     """Advance the flat state ``s`` to ``end`` [s], in place, as :func:`follow` does."""
-    return follow(s, stamps, values, times, places, out, np.array([end]), fine, plant,
-                  workspace(plant))
+    steps: int = follow(s, stamps, values, times, places, out, np.array([end]), fine, plant,
+                        workspace(plant))
+    refuse_runaway(steps)
+    return steps

@@ -14,6 +14,7 @@ from lg_husky_sim.simulation.arrays import workspace
 from lg_husky_sim.simulation.event_kernel import COLUMNS, follow
 from lg_husky_sim.simulation.events import Events, Propagator
 from lg_husky_sim.simulation.initial_state import InitialStates
+from lg_husky_sim.simulation.runaway import refuse_runaway
 import numpy as np
 
 
@@ -205,8 +206,9 @@ class Simulator:
         clock = np.add.accumulate(clock)
         stamps = np.concatenate([clock[0] + state.waiting[:, 0], clock[:-1]])
         values = np.concatenate([state.waiting[:, 1:], commands])
-        follow(flat, stamps, values, clock[1:], np.arange(steps), out, clock[1:], self.fine_pose,
-               self.propagator.packed, workspace(self.propagator.packed))
+        refuse_runaway(follow(
+            flat, stamps, values, clock[1:], np.arange(steps), out, clock[1:], self.fine_pose,
+            self.propagator.packed, workspace(self.propagator.packed)))
         ages = stamps - clock[-1]
         held = ages + self._latency >= -self.period
         row = out[-1] if steps else state.row

@@ -148,11 +148,15 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
     own = range(size, len(start.unknowns))
     slopes = [np.hstack([one, np.zeros((one.shape[0], len(own)))]) for one in base.slopes]
     few = int(setting('whole_rounds'))
-    best = evidence.fit(start, slopes, rounds=few, renew=own)
-    if best.cost < base.cost + setting('lost'):
-        best = evidence.fit(best.point, best.slopes, renew=own)
-        if whole:
-            best = evidence.fit(best.point, rounds=few)
+    try:
+        best = evidence.fit(start, slopes, rounds=few, renew=own)
+        if best.cost < base.cost + setting('lost'):
+            best = evidence.fit(best.point, best.slopes, renew=own)
+            if whole:
+                best = evidence.fit(best.point, rounds=few)
+    except LgHuskyError:
+        # On the brink of running away.
+        return None
     return Tried(hypothesis, best, base.cost - best.cost, evidence.count)
 
 
