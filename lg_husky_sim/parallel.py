@@ -103,8 +103,11 @@ def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
 
 
 def _begin(parent: int) -> None:
-    # In a new worker. Loky's would go on with its task and then wait for others for minutes,
-    # should the one who asked be killed.
+    # In a new worker, which one of loky's threads may have made that is not deaf to Ctrl-C.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    # Loky's would go on with its task and then wait for others for minutes, should the one who
+    # asked be killed.
     def follow() -> None:
         while os.getppid() == parent:
             time.sleep(LOOK)
