@@ -15,8 +15,6 @@ from collections.abc import Mapping, Sequence
 import math
 from typing import Any
 
-from lg_husky_sim.diagnosis.decision.confidence import COEFFICIENTS, informs
-from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.proof.scoring import judge
 from lg_husky_sim.proof.settings import settings
@@ -27,6 +25,20 @@ from scipy.optimize import minimize
 Json = Mapping[str, Any]
 
 FloatArray = NDArray[np.float64]
+
+#: Verdict to the names of its coefficients in the settings of the diagnosis.
+COEFFICIENTS = {
+    'known': ('name_constant', 'name_share'),
+    'nothing_missing': ('nothing_constant', 'nothing_chance'),
+    'unknown': ('unknown_constant', 'unknown_share_slope'),
+}
+
+
+def _row(verdict: str, features: Json) -> list[float]:
+    """Return what multiplies the coefficients of a verdict."""
+    if verdict == 'nothing_missing':
+        return [1.0, math.log10(max(float(features['chance']), 1e-12))]
+    return [1.0, math.log(max(float(features['share']), 1e-3))]
 
 
 def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
@@ -48,15 +60,13 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
     LgHuskyError
         If features are damaged, or no outcome has any.
     """
-    rows: dict[str, list[list[float]]] = {one.value: [] for one in COEFFICIENTS}
-    right: dict[str, list[float]] = {one.value: [] for one in COEFFICIENTS}
+    rows: dict[str, list[list[float]]] = {name: [] for name in COEFFICIENTS}
+    right: dict[str, list[float]] = {name: [] for name in COEFFICIENTS}
     for line in lines:
         mark = judge(line).right
         if line.get('features') and line['verdict'] in rows and mark is not None:
             try:
-                features = line['features']
-                row = [1.0, informs(Verdict(line['verdict']), float(features['share']),
-                                    float(features['chance']))]
+                row = _row(line['verdict'], line['features'])
             except (KeyError, TypeError, ValueError) as error:
                 raise LgHuskyError(f'case {line["case"]}: the features of its confidence need the '
                                    f'numbers share and chance: {error}') from error
@@ -67,8 +77,8 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
                            'earlier version, or all of before and after')
     found = {}
     for verdict, names in COEFFICIENTS.items():
-        x = np.array(rows[verdict.value]).reshape(-1, len(names))
-        y = np.array(right[verdict.value])
+        x = np.array(rows[verdict]).reshape(-1, len(names))
+        y = np.array(right[verdict])
         for name, value in zip(names, _fit(x, y), strict=True):
             found[name] = (value, y.size, int(np.sum(y)))
     return found

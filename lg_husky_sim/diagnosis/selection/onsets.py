@@ -26,9 +26,6 @@ from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Numbers in the columns of the onsets that are looked at together: a matter of memory alone.
-BATCH = 4_000_000
-
 
 def onsets_of(evidence: Evidence) -> list[Onset]:
     """Return where an effect may begin, on a coarse grid of times and places."""
@@ -94,7 +91,7 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
             if changes is None:
                 continue
             limits = limits_of(hypothesis, group)
-            width = max(1, BATCH // (evidence.count * len(group)))
+            width = max(1, int(setting('onset_batch')) // (evidence.count * len(group)))
             for first in range(0, len(onsets), width):
                 some = slice(first, first + width)
                 columns = _columns(evidence, changes, [on[:, some] for on in patterns])

@@ -48,12 +48,10 @@ class Look:
     gain: float
 
 
-#: Rows of columns that are worked on together: a matter of memory alone.
-ROWS = 8192
-
-
 def _slices(count: int) -> list[slice]:
-    return [slice(first, first + ROWS) for first in range(0, count, ROWS)]
+    # Rows of columns that are worked on together.
+    rows = int(setting('row_batch'))
+    return [slice(first, first + rows) for first in range(0, count, rows)]
 
 
 class Projection:
