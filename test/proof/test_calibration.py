@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from lg_husky_sim.cli.main import run
+from lg_husky_sim.diagnosis.decision import confidence
+from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.errors import LgHuskyError
-from lg_husky_sim.proof import outcomes
+from lg_husky_sim.proof import calibration, outcomes
 from lg_husky_sim.proof.calibration import calibrated
 import numpy as np
 import pytest
@@ -74,3 +76,12 @@ def test_command_prints_what_stands_in_the_settings(
     assert 'name_share: ' in capsys.readouterr().out
     assert run(['prove', '--calibrate']) != 0
     assert '--from' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('verdict', list(Verdict))
+@pytest.mark.parametrize('value', [0.0, 1e-20, 1e-5, 0.3, 1.0, 40.0])
+def test_what_is_fitted_is_what_the_diagnosis_uses(verdict: Verdict, value: float) -> None:
+    # The trial shares no code with the diagnosis, so that both say what informs.
+    assert calibration.COEFFICIENTS[verdict.value] == confidence.COEFFICIENTS[verdict]
+    assert calibration._row(verdict.value, {'share': value, 'chance': value}) == [
+        1.0, confidence.informs(verdict, value, value)]

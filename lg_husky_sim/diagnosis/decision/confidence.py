@@ -4,10 +4,10 @@
 How sure an answer is, by a logistic function of what informs about it.
 
 For each verdict ``p = 1 / (1 + exp(-(c0 + c1 x)))``. Posterior odds carry no information: the form
-of no law is exact, so that they are near 1 for right and wrong names alike. Neither does the
-margin to the next name: where it is small, the names are declared not to be told apart. What
-informs of a name, and of ``unknown``, is what a smooth effort still explains as a share of what
-the name explains, ``x = log(share)``; of ``nothing``, how far the largest gain is beyond chance,
+of no law is exact, so that they are near 1 for right and wrong names alike. The margin to the next
+name is not used: where it is small, the names are declared not to be told apart. What informs of
+a name, and of ``unknown``, is what a smooth effort still explains as a share of what the name
+explains, ``x = log(share)``; of ``nothing``, how far the largest gain is beyond chance,
 ``x = log10(chance)``.
 """
 

@@ -273,7 +273,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             base, seeds[0] = _read_like(evidence, base, seeds[0])
         else:
             seeds = []
-    logged = Logged(base) if otherwise else _as_logged(evidence, base)
+    logged = Logged(base, seeds) if otherwise else _as_logged(evidence, base)
     if seeds and seeds[0].gain > _promised(base, logged.fit):
         logged = Logged(base, seeds)
     postponed = bool(logged.better)
@@ -298,13 +298,13 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             if not adopted or best is None or one.base.cost - chosen.cost >= best.gain:
                 # The log was made otherwise, or else nothing says so: look again.
                 postponed = False
-                evidence, base = _read_as(evidence, one.base, chosen)
+                base = one.base
+                if otherwise is not None:
+                    evidence, base = otherwise
+                    chosen, otherwise = best_reading(evidence, base), None
+                evidence, base = _read_as(evidence, base, chosen)
                 start = _nominal(base.point)
                 continue
-        if otherwise is not None and not found and not adopted:
-            evidence, base = otherwise
-            otherwise, start = None, _nominal(base.point)
-            continue
         rounds.append(one)
         if number == 0:
             plain = one.base if otherwise is None else one.evidence.fit(otherwise[1].point)
