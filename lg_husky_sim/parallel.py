@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 import os
 import signal
 import socket
@@ -103,8 +104,11 @@ def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
 
 
 def _begin(parent: int) -> None:
-    # In a new worker, which one of loky's threads may have made that is not deaf to Ctrl-C.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # In a new worker. Ctrl-C ends it without a word, also where the one who asked is between two
+    # outcomes: at its exit, it waits for workers that go on.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(signal, 'pthread_sigmask'):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
     # Loky's would go on with its task and then wait for others for minutes, should the one who
     # asked be killed.
@@ -117,10 +121,12 @@ def _begin(parent: int) -> None:
 
 @contextmanager
 def _deaf_to_interrupts() -> Iterator[None]:
-    """Ctrl-C is for the one who asked, who ends the workers: they are born deaf to it."""
+    """Workers are born deaf to Ctrl-C, until they can end without a traceback."""
     if not hasattr(signal, 'pthread_sigmask'):  # Windows
         yield
         return
+    # Else its start, which comes with that of the first worker, would take the mask away.
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

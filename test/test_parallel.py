@@ -30,7 +30,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 try:
     answers = map_tasks(rest, [0.1, 300, 300], jobs=2)
     print(next(answers), flush=True)
-    next(answers)
+    ASK_ON
 except KeyboardInterrupt:
     print('interrupted', flush=True)
 """
@@ -63,15 +63,17 @@ if __name__ == '__main__':
 """
 
 
+@pytest.mark.parametrize('then', ['next(answers)', 'time.sleep(300)'])
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_no_process_outlives_the_one_who_asked(number: signal.Signals, tmp_path: Path) -> None:
+def test_no_process_outlives_the_one_who_asked(
+        number: signal.Signals, then: str, tmp_path: Path) -> None:
     """
     Asked to stop or killed, while a task would go on for minutes; and without a traceback.
 
     Ctrl-C goes to the workers too, as in a terminal. The program needs no guard of its main.
     """
     program = tmp_path / 'program.py'
-    program.write_text(PROGRAM, encoding='utf-8')
+    program.write_text(PROGRAM.replace('ASK_ON', then), encoding='utf-8')
     with subprocess.Popen([sys.executable, str(program)], stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE, text=True, start_new_session=True) as asked:
         assert asked.stdout is not None
