@@ -13,6 +13,7 @@ from lg_husky_sim.diagnosis.decision.confidence import confidence, Features
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
 from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import neutral_of
+from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, Effort
 from lg_husky_sim.diagnosis.localisation import Missing, where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
@@ -189,9 +190,9 @@ def needed_evidence(rest: Sequence[Effort], free: Sequence[Missing]) -> float:
     ----------
     rest : sequence of Effort
     free : sequence of Missing
-        Each balance is looked at twice: for an effort that acts all the time and for bursts.
+        Each balance is looked at for bursts.
     """
-    return evidence_beyond_chance(len(rest) + 2 * len({m.balance for m in free}))
+    return evidence_beyond_chance(len(rest) + len({m.balance for m in free}))
 
 
 def remaining(search: Search) -> Search:
@@ -241,7 +242,7 @@ def felt(rest: Sequence[Effort], free: Sequence[Missing]
     largest = dict.fromkeys(BALANCES, 0.0)
     for one in free:
         largest[one.balance] = max(largest[one.balance], float(np.max(np.abs(one.values))))
-    return (tuple(e for e in rest if float(np.max(np.abs(e.values))) >= least[e.balance]),
+    return (tuple(e for e in rest if e.largest >= least[e.balance]),
             tuple(m for m in free if largest[m.balance] >= least[m.balance]))
 
 
@@ -272,8 +273,8 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     """
     needed = needed_evidence(rest, free)
     rest, free = felt(rest, free)
-    is_left = max([0.0, *(e.evidence for e in rest), *(m.evidence for m in free)]) > needed
-    explained = max([0.0, *(e.explained for e in rest), *(m.explained for m in free)])
+    is_left = max([0.0, *(e.evidence for e in rest), *(m.bursts for m in free)]) > needed
+    explained = max([0.0, *(e.explained for e in rest), *(m.bursts for m in free)])
     first = search.rounds[0]
     tried = first.tried
     if not search.adopted:
@@ -324,20 +325,20 @@ def unknown_finding(search: Search, rest: Sequence[Effort], free: Sequence[Missi
     """Return what is missing without a name, by its best description."""
     rest, free = felt(rest, free)
     smooth = max(rest, key=lambda one: one.evidence, default=None)
-    bursts = max(free, key=lambda one: one.evidence, default=None)
-    if smooth is not None and (bursts is None or smooth.evidence >= bursts.evidence):
-        balance, parts, most = smooth.balance, [smooth.values], smooth.evidence
+    bursts = max(free, key=lambda one: one.bursts, default=None)
+    if smooth is not None and (bursts is None or smooth.evidence >= bursts.bursts):
+        balance, largest, most = smooth.balance, smooth.largest, smooth.evidence
         regime = smooth.argument.replace('_', ' ')
-        how = f', a smooth function of {regime}'
+        how = (f' that follows {PAST[smooth.argument][2]}' if smooth.argument in PAST else
+               f', a smooth function of {regime}')
     else:
         assert bursts is not None  # else nothing is left, and the verdict another one
-        balance, most, regime = bursts.balance, bursts.evidence, 'scattered times'
-        parts = [m.values for m in free if m.balance == balance]
+        balance, most, regime = bursts.balance, bursts.bursts, 'scattered times'
+        largest = max(float(np.max(np.abs(m.values))) for m in free if m.balance == balance)
         how = f' at {regime}'
     where = {'force': 'a force on the chassis', 'moment': 'a yaw moment on the chassis',
              'torque_left': 'a torque on the left wheels',
              'torque_right': 'a torque on the right wheels'}[balance]
-    largest = max(float(np.max(np.abs(one), initial=0.0)) for one in parts)
     _, _, side, subsystem, unit = BALANCES[balance]
     text = (f'No effect of the catalogue explains it; it is best described as {where}{how}, '
             f'up to {largest:.3g} {unit}.')

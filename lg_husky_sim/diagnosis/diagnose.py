@@ -26,6 +26,7 @@ from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors
+from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts
 from lg_husky_sim.diagnosis.localisation import mismatches, Missing, missing_efforts
 from lg_husky_sim.diagnosis.model_mismatch import model_mismatch, ModelMismatch, unsearched
@@ -199,10 +200,11 @@ def _remaining(found: Search, rest: Sequence[Effort]) -> str:
     text = []
     if rest and rest[0].evidence > 0.0:
         first = rest[0]
+        of = PAST[first.argument][2] if first.argument in PAST else (
+            first.argument.replace('_', ' '))
         text.append(f'the best smooth description of the remaining residual is a '
-                    f'{first.balance.replace("_", " ")} as a function of '
-                    f'{first.argument.replace("_", " ")}, with a log evidence of '
-                    f'{first.evidence:.1f} nats')
+                    f'{first.balance.replace("_", " ")} as a function of {of}, with a log '
+                    f'evidence of {first.evidence:.1f} nats')
     last = found.rounds[-1]
     if last.tried and not (found.found and last is found.rounds[len(found.found) - 1]):
         best = last.tried[0]

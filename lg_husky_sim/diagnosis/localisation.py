@@ -17,7 +17,8 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import probe_times
 from lg_husky_sim.diagnosis.evidence.whitener import respond
 from lg_husky_sim.diagnosis.hypotheses.bursts import burst_evidence, levelled
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, beyond_chance, hats
+from lg_husky_sim.diagnosis.hypotheses.hat_functions import hats
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, beyond_chance
 from lg_husky_sim.diagnosis.result import Mismatch
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.settings import setting
@@ -50,10 +51,11 @@ class Missing:
     times, values, deviations : numpy.ndarray, shape (n,)
         [s], mean and standard deviation [unit of the balance].
     evidence : float
-        Log evidence of the balance over all drives [nats]: of an effort of one size all the
-        time, or of one that bursts, where innovations are not quite white.
-    explained : float
-        The same of white ones.
+        Log evidence of an effort of one size all the time, over all drives, where innovations
+        are not quite white [nats]. It says where a model is off, and not that anything is
+        missing: noise whose spectrum is not that of the model of it has some as well.
+    bursts : float
+        Log evidence of an effort that bursts, over all drives [nats].
     """
 
     balance: str
@@ -62,7 +64,7 @@ class Missing:
     values: FloatArray
     deviations: FloatArray
     evidence: float
-    explained: float
+    bursts: float
 
 
 def steady_knots(drive: Drive, count: int) -> np.typing.NDArray[np.bool_]:
@@ -135,18 +137,18 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
                     frame.sine, whitener.model, setting('longest_step'), out)
             columns[top:top + len(out), first:first + count] = whitener.apply(out)
             first, top = first + count, top + len(out)
-        gain, explained, values, deviations = beyond_chance(evidence, fit, projection, columns)
+        gain, _, values, deviations = beyond_chance(evidence, fit, projection, columns)
+        bursts = 0.0
         if BALANCES[balance][2] == 'none':
             # Those of the wheels burst with every command that comes a little late.
             normal, slope = projection.problem(columns[:, steady])
             bursts = burst_evidence(levelled(
                 slope / np.sqrt(np.maximum(np.diag(normal), 1e-12)), speeds))
-            gain, explained = max(gain, bursts), max(explained, bursts)
         first = 0
         for size, drive in zip(counts, evidence.drives, strict=True):
             part = slice(first, first + size)
             found.append(Missing(balance, drive, np.linspace(drive.start, drive.end, size),
-                                 values[part], deviations[part], gain, explained))
+                                 values[part], deviations[part], gain, bursts))
             first += size
     return tuple(found)
 

@@ -4,8 +4,10 @@
 Efforts that are smooth functions of some quantity, at some balance: physics without a name.
 
 An effort is a sum of hat functions of a quantity q, ``f(q) = sum c_k hat_k(q)`` with independent
-Gaussian c_k. With the whitened responses C of the hats (the numbers of the base projected out) and
-what is left e, its log evidence against no effort, at the likeliest size s, is::
+Gaussian c_k, or of responses to a past motion (:mod:`.past_motion`). One that varies freely in
+time is none: that is what noise does, whatever its spectrum. With the whitened responses C of the
+hats (the numbers of the base projected out) and what is left e, its log evidence against no
+effort, at the likeliest size s, is::
 
     max over s of  b' (G + I/s^2)^-1 b / 2 - ln det(I + s^2 G) / 2,   G = C'C,  b = C'e
 
@@ -22,6 +24,8 @@ from lg_husky_sim.diagnosis.evidence.drives import Channel
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import Motion, probe_times
 from lg_husky_sim.diagnosis.evidence.whitener import respond
+from lg_husky_sim.diagnosis.hypotheses.hat_functions import hats
+from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST, responses
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
@@ -37,7 +41,10 @@ BALANCES = {
 }
 #: Quantities that an effort at the chassis and one at the wheels may be a function of.
 CHASSIS = ('forward', 'yaw', 'acceleration', 'heading', 'x', 'y', 'time')
-WHEELS = ('wheel_rate', 'angle', 'wheel_acceleration', 'time')
+ARGUMENTS = {'force': (*CHASSIS, 'past_forward', 'past_direction'),
+             'moment': (*CHASSIS, 'past_yaw', 'past_turn'),
+             **dict.fromkeys(('torque_left', 'torque_right'), (
+                 'wheel_rate', 'angle', 'wheel_acceleration', 'time', 'past_wheel_rate'))}
 #: Those that a description of the catalogue knows, so that a model can hold them.
 WRITABLE = ('forward', 'yaw', 'heading', 'x', 'y', 'time', 'wheel_rate', 'angle')
 
@@ -60,7 +67,10 @@ class Effort:
     low, high : float
         Range of the quantity [its unit].
     values, deviations : numpy.ndarray, shape (n_knots,)
-        At evenly spaced knots over the range [unit of the balance].
+        At evenly spaced knots over the range [unit of the balance]; of a past motion what a
+        second of its signal does.
+    largest : float
+        Largest size in these drives [unit of the balance].
     """
 
     balance: str
@@ -71,6 +81,7 @@ class Effort:
     high: float
     values: FloatArray
     deviations: FloatArray
+    largest: float
 
     @property
     def subsystem(self) -> str:
@@ -106,18 +117,6 @@ def quantities(evidence: Evidence, motions: Sequence[Motion]) -> list[dict[str, 
             one[f'wheel_acceleration_{side}'] = np.gradient(rate, times)
             one[f'angle_{side}'] = np.mod(motion.column(f'angle_{side}', 'probe'), 2.0 * np.pi)
         found.append(one)
-    return found
-
-
-def hats(values: FloatArray, low: float, high: float, count: int) -> FloatArray:
-    """Return the hat functions of values over a range, shape (n, count)."""
-    place = np.clip((values - low) / max(high - low, 1e-12) * (count - 1), 0.0, count - 1.0)
-    left = np.minimum(place.astype(np.int64), count - 2)
-    share = place - left
-    found = np.zeros((values.size, count))
-    rows = np.arange(values.size)
-    found[rows, left] = 1.0 - share
-    found[rows, left + 1] = share
     return found
 
 
@@ -214,13 +213,16 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
         balance, argument = task
         row = BALANCES[balance][0]
         side = BALANCES[balance][2]
-        name = argument if side == 'none' or argument == 'time' else f'{argument}_{side}'
+        quantity = PAST[argument][0] if argument in PAST else argument
+        name = quantity if side == 'none' or quantity == 'time' else f'{quantity}_{side}'
         pooled = np.concatenate([one[name] for one in known])
         low, high = (0.0, 2.0 * np.pi) if argument in ('heading', 'angle') else (
             float(np.min(pooled)), float(np.max(pooled)))
-        parts = []
+        parts, shapes = [], []
         for drive, one, whitener in zip(evidence.drives, known, evidence.whiteners, strict=True):
-            shape = hats(one[name], low, high, count)
+            shape = hats(one[name], low, high, count) if quantity == argument else responses(
+                one[name], probe_times(drive), argument, count)
+            shapes.append(shape)
             pushed = np.zeros((shape.shape[0], 4, count))
             pushed[:, row] = shape
             frame = whitener.frame
@@ -230,7 +232,7 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
             parts.append(whitener.apply(out))
         gain, explained, values, deviations = beyond_chance(
             evidence, fit, projection, np.concatenate(parts))
-        return Effort(balance, argument, gain, explained, low, high, values, deviations)
-    tasks = [(b, a) for b in BALANCES for a in (
-        CHASSIS if BALANCES[b][2] == 'none' else WHEELS)]
+        largest = max(float(np.max(np.abs(shape @ values))) for shape in shapes)
+        return Effort(balance, argument, gain, explained, low, high, values, deviations, largest)
+    tasks = [(b, a) for b in BALANCES for a in ARGUMENTS[b]]
     return tuple(sorted(evidence.pool.map(one_of, tasks), key=lambda e: -e.evidence))
