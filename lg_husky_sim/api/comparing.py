@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 import math
 import os
 from pathlib import Path
 import tempfile
-from typing import Any, TypeAlias
+from typing import Any, TYPE_CHECKING, TypeAlias
 
 from lg_husky_sim import recording as rec
 from lg_husky_sim.api.progress import Report, Shown, shown
@@ -21,6 +22,7 @@ from lg_husky_sim.comparison.metrics import UNITS
 from lg_husky_sim.comparison.models import NamedPlant, plants_in, recordings_of, unique_labels
 from lg_husky_sim.comparison.outcome import (
     as_json,
+    closest,
     compare_recording,
     labels,
     RecordingOutcome,
@@ -32,6 +34,9 @@ from lg_husky_sim.folders import result_folder
 from lg_husky_sim.husky.model_file import default_model_path
 from lg_husky_sim.recording.names import printable
 import numpy as np
+
+if TYPE_CHECKING:
+    from lg_husky_sim.diagnosis.prediction_errors import Assessment
 
 Model: TypeAlias = PathLike | Husky
 Models: TypeAlias = Model | Sequence[Model] | Mapping[str, Model] | None
@@ -87,9 +92,20 @@ class Comparison:
         """Return the errors as a pandas DataFrame, index recording and quantity."""
         return self.table().to_pandas().set_index(['recording', 'quantity'])
 
+    @cached_property
+    def what_to_change(self) -> Assessment:
+        """How the recordings differ from the closest model, and what to change for it."""
+        from lg_husky_sim.diagnosis.prediction_errors import assess
+
+        label = closest(self.outcomes, [named.label for named in self.plants])
+        model, = (named.model for named in self.plants if named.label == label)
+        return assess([(part.segment, part.predictions[label]) for outcome in self.outcomes
+                       for part in outcome.segments], label, model.parameters)
+
     def data(self) -> dict[str, object]:
         """Return the comparison as plain data, schema ``lg_husky_sim/comparison/1``."""
-        return as_json(self.outcomes, self.plants, self.horizon, self.settings)
+        return {**as_json(self.outcomes, self.plants, self.horizon, self.settings),
+                'what_to_change': self.what_to_change.data()}
 
     def plot(self, axes: Sequence[Any] | None = None, recording: int = 0) -> Any:
         """
@@ -148,7 +164,7 @@ class Comparison:
         pathlib.Path
             The page.
         """
-        from lg_husky_sim.comparison.page import MARKER, PAGE, write_files
+        from lg_husky_sim.comparison.page import MARKER, PAGE, report_data, write_files
         from lg_husky_sim.reporting.provenance import provenance
 
         target = Path(folder)
@@ -158,11 +174,13 @@ class Comparison:
         def each() -> None:
             if progress is not None:
                 progress('drawing', (next(drawn, total) + 1) / max(total, 1))
+        page = report_data(
+            self.outcomes, self.plants, self.horizon, self.settings, provenance(
+                [(one.recording.name, one.recording.path) for one in self.outcomes],
+                [(named.label, named.path) for named in self.plants]),
+            self.what_to_change.advice())
         with result_folder(target, MARKER) as made:
-            write_files(made, self.outcomes, self.plants, self.horizon, figures, self.settings,
-                        each, provenance(
-                            [(one.recording.name, one.recording.path) for one in self.outcomes],
-                            [(named.label, named.path) for named in self.plants]))
+            write_files(made, page, self.data(), f'{self}\n', figures, each)
         return target / PAGE
 
     def save_bag(self, path: PathLike, *, recording: int = 0, overwrite: bool = False) -> Path:
@@ -210,11 +228,12 @@ class Comparison:
         return self.save(folder or tempfile.mkdtemp(prefix='lg_husky_compare.'))
 
     def __str__(self) -> str:
-        """Return the errors as text."""
-        return text_table(self.outcomes)
+        """Return the errors, and what to change, as text."""
+        return f'{text_table(self.outcomes)}\n{self.what_to_change}'
 
     def _repr_html_(self) -> str:
         return page_part('Comparison', ['Errors are measured minus predicted.'], [self.table()], {
+            **{one.where: one.sentences for one in self.what_to_change.advice()},
             'Notes': [note for outcome in self.outcomes
                       for note in (*outcome.recording.notes, *outcome.gaps())]})
 

@@ -14,7 +14,8 @@ from lg_husky_sim.api.recordings import PathLike, rate, Recording
 from lg_husky_sim.api.robots import as_husky, Husky
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.diagnosis.sensors.faults import faults
-from lg_husky_sim.diagnosis.sensors.relations import Number, Relation, relations
+from lg_husky_sim.diagnosis.sensors.regression import Number
+from lg_husky_sim.diagnosis.sensors.relations import Relation, relations
 from lg_husky_sim.diagnosis.sensors.robot import differences
 from lg_husky_sim.errors import FitError, ParameterError, RecordingError
 from lg_husky_sim.identification.confidence import confidence, undetermined

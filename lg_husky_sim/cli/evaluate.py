@@ -45,7 +45,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.option('--jobs', type=click.IntRange(min=1), default=1, show_default=True,
               help='Processes to use.')
 @topics_option
-@spoken(page=True, data=False)
+@spoken(page=True)
 def command(
     out: Path, cases: tuple[str, ...], calibrate: tuple[str, ...], held_out: tuple[str, ...],
     rivals: tuple[str, ...], steps: tuple[str, ...], model: Path | None,
@@ -83,10 +83,10 @@ def command(
     request = Request(chosen, calibrate, held_out, rivals, steps, start, seed, starts, jobs,
                       TopicMap.parse(topics))
     with say.stages(known=False) as report:
-        text = run_evaluation(
+        found = run_evaluation(
             request, out, lambda word: report(f'evaluating: {word}', None), provenance(
                 [(Path(path).name, path) for path in (*calibrate, *held_out, *rivals, *steps)],
                 [('of --model', model)] if model else []))
-    say.result(text)
+    say.result(found.text, found.data)
     say.remark('')
     say.written(out / 'index.html')

@@ -27,6 +27,8 @@ from lg_husky_sim.signals import TimeSeries
 import numpy as np
 
 SCHEMA = 'lg_husky_sim/comparison/1'
+#: Quantities by which models are ranked, the first that was recorded: what a robot is for.
+RANKED = ('position', 'wheel_speed', 'yaw_rate', 'forward')
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +158,16 @@ def labels(outcomes: Sequence[RecordingOutcome]) -> tuple[str, ...]:
     """Return the labels of all models and rivals, in order."""
     return tuple(dict.fromkeys(
         label for outcome in outcomes for part in outcome.segments for label in part.predictions))
+
+
+def closest(outcomes: Sequence[RecordingOutcome], names: Sequence[str]) -> str:
+    """Return the model of some that is closest to the recordings; the first if none is known."""
+    errors = {name: pooled(outcome.errors(name) for outcome in outcomes) for name in names}
+    for channel in RANKED:
+        known = {name: own[channel].rmse for name, own in errors.items() if channel in own}
+        if known:
+            return min(known, key=lambda name: known[name])
+    return names[0]
 
 
 def text_table(outcomes: Sequence[RecordingOutcome]) -> str:

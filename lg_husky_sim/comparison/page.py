@@ -10,11 +10,18 @@ import math
 from pathlib import Path
 
 from lg_husky_sim.comparison.models import NamedPlant
-from lg_husky_sim.comparison.outcome import as_json, labels, RecordingOutcome, text_table
+from lg_husky_sim.comparison.outcome import labels, RANKED, RecordingOutcome
 from lg_husky_sim.comparison.slopes import WINDOW
 from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
 from lg_husky_sim.recording.names import printable
-from lg_husky_sim.reporting.data import ErrorTable, Headline, Provenance, ReportData, Trace
+from lg_husky_sim.reporting.data import (
+    Advice,
+    ErrorTable,
+    Headline,
+    Provenance,
+    ReportData,
+    Trace,
+)
 from lg_husky_sim.reporting.words import (
     capitalised,
     number,
@@ -30,16 +37,13 @@ import numpy as np
 MARKER = 'compare.json'
 """File that tells a folder of comparisons."""
 PAGE = 'index.html'
-#: Quantities by which models are ranked, the first that was recorded: what a robot is for.
-RANKED = ('position', 'wheel_speed', 'yaw_rate', 'forward')
 #: Share of the error of the forward speed from which the scatter of the pose is worth a note.
 SCATTER = 0.3
 
 
 def write_files(
-    folder: Path, outcomes: Sequence[RecordingOutcome], plants: Sequence[NamedPlant],
-    horizon: float = 0.0, most: int = 6, settings: Mapping[str, float] | None = None,
-    on_progress: Callable[[], object] | None = None, provenance: Provenance | None = None,
+    folder: Path, data: ReportData, plain: Mapping[str, object], text: str, most: int = 6,
+    on_progress: Callable[[], object] | None = None,
 ) -> tuple[Path, ...]:
     """
     Write compare.json, compare.txt, the pictures and index.html.
@@ -48,17 +52,16 @@ def write_files(
     ----------
     folder : pathlib.Path
         An existing, empty folder.
-    outcomes : sequence of RecordingOutcome
-    plants : sequence of NamedPlant
-    horizon : float
-        As it was compared with.
+    data : ReportData
+        The page.
+    plain : mapping of str to object
+        Content of compare.json.
+    text : str
+        Content of compare.txt.
     most : int
         Recordings that get pictures, the first ones.
-    settings : mapping of str to float, optional
-        Parameters that were overridden in every model.
     on_progress : callable, optional
         Called after each picture.
-    provenance : Provenance, optional
 
     Returns
     -------
@@ -70,17 +73,16 @@ def write_files(
     MissingExtraError
         If matplotlib or jinja2 is not installed.
     """
-    (folder / 'compare.txt').write_text(text_table(outcomes), encoding='utf-8')
+    (folder / 'compare.txt').write_text(text, encoding='utf-8')
     (folder / MARKER).write_text(
-        json.dumps(as_json(outcomes, plants, horizon, settings), indent=1, ensure_ascii=False,
-                   allow_nan=False) + '\n', encoding='utf-8')
-    data = report_data(outcomes, plants, horizon, settings, provenance)
+        json.dumps(plain, indent=1, ensure_ascii=False, allow_nan=False) + '\n', encoding='utf-8')
     return write_report(data, folder, PAGE, pictured=most, on_progress=on_progress)
 
 
 def report_data(
     outcomes: Sequence[RecordingOutcome], plants: Sequence[NamedPlant], horizon: float = 0.0,
     settings: Mapping[str, float] | None = None, provenance: Provenance | None = None,
+    advice: Sequence[Advice] = (),
 ) -> ReportData:
     """
     Return a comparison as the values of a report, a column for each model and rival.
@@ -92,6 +94,7 @@ def report_data(
     horizon : float
     settings : mapping of str to float, optional
     provenance : Provenance, optional
+    advice : sequence of Advice
 
     Returns
     -------
@@ -125,7 +128,7 @@ def report_data(
     names = ', '.join(outcome.recording.name for outcome in outcomes)
     return ReportData(
         f'Comparison with {names}', _headline(tables[0], len(outcomes), seconds), columns,
-        tuple(about), traces, tuple(tables), notes=tuple(notes),
+        tuple(about), traces, tuple(tables), advice=tuple(advice), notes=tuple(notes),
         files=(('compare.json', 'has all numbers'), ('compare.txt', 'has the tables')),
         provenance=provenance or Provenance())
 

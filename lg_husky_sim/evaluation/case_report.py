@@ -187,7 +187,7 @@ def section(result: CaseResult) -> Section:
 def text(result: CaseResult) -> str:
     """Return the case as text."""
     parts = [f'{result.case.name}: {result.case.about}', as_text(table(result)),
-             as_text(parameter_table(result)), *verdict(result)]
+             as_text(parameter_table(result)), *verdict(result), str(result.what_to_change)]
     return '\n\n'.join(parts)
 
 
@@ -213,4 +213,5 @@ def data(result: CaseResult) -> dict[str, Any]:
             for drive in result.drives],
         'fits': {label: fit.data() for label, fit in result.fits.items()},
         'verdict': verdict(result),
+        'what_to_change': result.what_to_change.data(),
     }

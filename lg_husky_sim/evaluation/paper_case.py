@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from lg_husky_sim.comparison.metrics import Tracking, tracking
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.rival import rival_prediction
+from lg_husky_sim.diagnosis.prediction_errors import assess, Assessment
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.evaluation.cases import Case
 from lg_husky_sim.husky.model import compile_model
@@ -79,6 +81,14 @@ class CaseResult:
     def labels(self) -> tuple[str, ...]:
         """Labels of all predictions, in order."""
         return tuple(self.drives[0].tracks)
+
+    @cached_property
+    def what_to_change(self) -> Assessment:
+        """How the drives differ from the closest calibrated model, and what to change for it."""
+        judged = [drive for drive in self.drives if drive.held_out] or list(self.drives)
+        label = min(self.fits, key=lambda label: max(max(drive.bounds(label)) for drive in judged))
+        return assess([(drive.segment, drive.predictions[label]) for drive in self.drives], label,
+                      self.fits[label].model.parameters)
 
 
 def evaluate_case(case: Case, model: ModelFile, seed: int, starts: int = STARTS, jobs: int = 1,

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
+from lg_husky_sim.comparison.replay import replay
+from lg_husky_sim.diagnosis.prediction_errors import assess, Assessment
 from lg_husky_sim.errors import FitError
 from lg_husky_sim.evaluation.baselines import (
     fit_kinematics,
@@ -25,7 +27,7 @@ from lg_husky_sim.identification.noise import scales
 from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.identification.problem import Observations, observations, UNITS
 from lg_husky_sim.identification.result import FitResult
-from lg_husky_sim.recording import Recording, segments
+from lg_husky_sim.recording import Recording, Segment, segments
 from lg_husky_sim.reporting.sections import Table
 from lg_husky_sim.reporting.words import quantity
 from lg_husky_sim.signals import FloatArray
@@ -65,6 +67,8 @@ class StepsResult:
         Root mean square of each channel by model [unit of the channel].
     refit, extended : FitResult
         The graph refitted, and with what the base does to a command.
+    what_to_change : Assessment
+        How the recording differs from the last of these, and what to change for it.
     """
 
     recording: str
@@ -75,6 +79,7 @@ class StepsResult:
     errors: dict[str, tuple[float, ...]]
     refit: FitResult
     extended: FitResult
+    what_to_change: Assessment
 
 
 def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts: int = 6,
@@ -130,7 +135,12 @@ def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts
         tuple(int(held.channel_mask(_channel(name)).sum()) for name in _rows(held)),
         tuple(int((held.channel_mask(_channel(name)) & ~use).sum()) for name in _rows(held)),
         {label: _errors(held, values, use) for label, values in predicted.items()},
-        refit, extended)
+        refit, extended, _what_to_change(parts, extended.model))
+
+
+def _what_to_change(parts: Sequence[Segment], model: ModelFile) -> Assessment:
+    plant = compile_model(model.structure).at(model.parameters)
+    return assess([(part, replay(plant, part)) for part in parts], LABELS[-1], model.parameters)
 
 
 def _rows(data: Observations) -> tuple[str, ...]:
@@ -191,4 +201,5 @@ def steps_data(result: StepsResult) -> dict[str, Any]:
         'held_out_rms': {label: [value if math.isfinite(value) else None for value in values]
                          for label, values in result.errors.items()},
         'refit': result.refit.data(), 'extended': result.extended.data(),
+        'what_to_change': result.what_to_change.data(),
     }

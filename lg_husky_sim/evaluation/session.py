@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import json
 from pathlib import Path
@@ -61,6 +61,23 @@ class Request:
     topics: TopicMap | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """
+    What an evaluation found.
+
+    Parameters
+    ----------
+    text : str
+        The tables, and what to change.
+    data : mapping of str to Any
+        The content of evaluation.json.
+    """
+
+    text: str
+    data: Mapping[str, Any]
+
+
 def _cases(request: Request) -> list[Case]:
     made = [{'synthetic': synthetic_case, 'engine': engine_case}[name](request.seed)
             for name in request.cases]
@@ -71,7 +88,7 @@ def _cases(request: Request) -> list[Case]:
 
 
 def run_evaluation(request: Request, out: Path, tell: Callable[[str], None],
-                   provenance: Provenance | None = None) -> str:
+                   provenance: Provenance | None = None) -> Evaluation:
     """
     Evaluate and write the folder, whole or not at all.
 
@@ -86,8 +103,7 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None],
 
     Returns
     -------
-    str
-        The tables as text.
+    Evaluation
     """
     read, = named_apart([read_recording(path, request.topics) for path in request.steps])
     results = [evaluate_case(case, request.model, request.seed, request.starts, request.jobs,
@@ -113,7 +129,7 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None],
                                      encoding='utf-8')
         write_report(report_data(request, results, steps, provenance), folder, 'index.html',
                      pictured=0)
-    return text
+    return Evaluation(text, data)
 
 
 def report_data(request: Request, results: Sequence[CaseResult], steps: Sequence[StepsResult],
@@ -136,6 +152,8 @@ def report_data(request: Request, results: Sequence[CaseResult], steps: Sequence
     said = [line for result in results for line in case_report.verdict(result)[:1]]
     closest = [name if len(results) == 1 else f'{result.case.name}: {name}' for result in results
                if (name := case_report.closest(result))]
+    assessed = [*((result.case.name, result.what_to_change) for result in results),
+                *((result.recording, result.what_to_change) for result in steps)]
     facts = (('Cases', ', '.join(result.case.name for result in results) or 'none'),
              ('Recordings of steps', str(len(steps))), ('Seed', str(request.seed)))
     return ReportData(
@@ -147,6 +165,8 @@ def report_data(request: Request, results: Sequence[CaseResult], steps: Sequence
         errors=(*map(case_report.papers_numbers, results), *(
             replace(table, folded=True) for result in results for table in recording_tables(
                 case_report.parts_of(result), result.labels))),
+        advice=tuple(advice for name, assessment in assessed
+                     for advice in assessment.advice(name if len(assessed) > 1 else '')),
         sections=(*map(case_report.section, results), *map(_steps_section, steps)),
         notes=(f'Errors are {SIGN}; x is ahead and y to the left of the robot as it stood at the '
                'start.',),
@@ -157,7 +177,8 @@ def report_data(request: Request, results: Sequence[CaseResult], steps: Sequence
 def steps_text(result: StepsResult) -> str:
     """Return a recording's table and the estimates of its last model as text."""
     return (f'{result.recording}: {result.steps} steps, every other one fitted\n\n'
-            f'{case_report.as_text(steps_table(result))}\n\n{LABELS[-1]}:\n{result.extended}')
+            f'{case_report.as_text(steps_table(result))}\n\n{LABELS[-1]}:\n{result.extended}\n\n'
+            f'{result.what_to_change}')
 
 
 def _steps_section(result: StepsResult) -> Section:

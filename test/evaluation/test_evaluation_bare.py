@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 import sys
 
@@ -26,14 +27,24 @@ def test_without_mujoco_the_engine_is_left_out_and_said(
         monkeypatch.setitem(sys.modules, 'mujoco', None)
     asked: list[tuple[str, ...]] = []
 
-    def evaluated(request: session.Request, *_: object) -> str:
+    def evaluated(request: session.Request, *_: object) -> session.Evaluation:
         asked.append(tuple(request.cases))
-        return 'six numbers'
+        return session.Evaluation('six numbers', {'cases': []})
     monkeypatch.setattr(session, 'run_evaluation', evaluated)
     assert run(['evaluate', '--out', str(tmp_path / 'out')]) == 0
     assert asked == [('synthetic', 'engine') if installed else ('synthetic',)]
     said = capsys.readouterr()
     assert ('it needs MuJoCo' in said.out + said.err) is not installed
+
+
+def test_the_result_is_printed_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                       capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(session, 'run_evaluation', lambda *_: session.Evaluation(
+        'six numbers', {'cases': [{'what_to_change': {'differences': []}}]}))
+    assert run(['evaluate', '--out', str(tmp_path / 'out'), '--case', 'synthetic', '--json']) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)['cases'] == [{'what_to_change': {'differences': []}}]
+    assert str(tmp_path / 'out' / 'index.html') in said.err
 
 
 def test_the_synthetic_case_needs_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:

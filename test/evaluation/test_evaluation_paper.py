@@ -51,6 +51,18 @@ def test_the_six_numbers_stand_beside_the_papers(evaluated: Path) -> None:
             assert f'{value:.4f}' in text
 
 
+def test_what_to_change_is_said_of_the_closest_calibrated_model(evaluated: Path) -> None:
+    (case,) = json.loads((evaluated / 'evaluation.json').read_text())['cases']
+    said = case['what_to_change']
+    worst = {label: max(max(row['bounds'][label]) for row in case['tracking_error']
+                        if row['held_out']) for label in case['fits']}
+    assert said['model'] == min(worst, key=lambda label: worst[label])
+    # Least squares on this very graph leaves no gain and no delay.
+    assert said['compared']
+    assert said['differences'] == []
+    assert 'Gains and delays agree' in (evaluated / 'index.html').read_text()
+
+
 def test_held_out_errors_are_of_the_papers_size_or_better(evaluated: Path) -> None:
     (case,) = json.loads((evaluated / 'evaluation.json').read_text())['cases']
     for row in case['tracking_error'][1:]:

@@ -146,6 +146,9 @@ def test_what_the_base_does_is_found_on_held_out_steps() -> None:
     assert [row[0] for row in table.rows][:2] == [
         'left wheel rate [rad/s]', 'right wheel rate [rad/s]']
     assert steps_data(result)['steps'] == 10
+    # With latency and limit in the model, nothing of either is left to change.
+    assert {error.kind for error in result.what_to_change.errors}.isdisjoint(
+        {'late', 'yaw_limit', 'turn_gain', 'slip'})
 
 
 def test_a_follower_without_controller_starts_in_motion() -> None:

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.result import Estimate
-from lg_husky_sim.diagnosis.sensors.relations import by_names, Number, Relation
+from lg_husky_sim.diagnosis.sensors.regression import Number
+from lg_husky_sim.diagnosis.sensors.relations import by_names, Relation
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import ModelFileError
 from lg_husky_sim.husky.effects import Effect
