@@ -73,7 +73,7 @@ def map_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
                 found = parallel(delayed(function)(task) for task in tasks)
             yield from found
         except BrokenProcessPool as error:
-            raise BackendError('a worker process was killed, perhaps for want of memory: try '
+            raise BackendError('a worker process was killed, perhaps because memory ran out: try '
                                f'fewer than {jobs} jobs') from error
 
 

@@ -156,7 +156,7 @@ class Comparison:
         folder : path-like
             Made, or files of an earlier run in it replaced.
         figures : int
-            Recordings whose signals and path are drawn as PNG too, the first ones.
+            Number of recordings, from the first, whose signals and path are drawn as PNG too.
         progress : callable, optional
 
         Returns

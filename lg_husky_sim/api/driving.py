@@ -90,7 +90,7 @@ def is_recording(commands: PathLike) -> bool:
 
 def _series(commands: Drive, topics: Topics) -> tuple[str, TimeSeries]:
     if topic_map(topics) != rec.TopicMap():
-        raise CommandError('topics can be chosen only in a recording, and '
+        raise CommandError('topics can only be chosen for a recording, and '
                            f'{_shown(commands)} is none')
     if isinstance(commands, Manoeuvre):
         return commands.name, commands.commands()

@@ -11,7 +11,7 @@ from lg_husky_sim.manoeuvres import builtin_manoeuvres
 
 def list_effects(name: str | None = None) -> Table:
     """
-    List the catalogue of effects, or the numbers of one.
+    List the catalogue of effects, or the parameters of one.
 
     Parameters
     ----------

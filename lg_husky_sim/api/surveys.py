@@ -103,7 +103,7 @@ class Survey:
     def points(self) -> dict[str, tuple[str, ...]]:
         """Return the lists by their headings."""
         return {'Warnings': self.warnings, 'Missing for a diagnosis': self.missing,
-                'What this drive leaves open': self.undetermined,
+                'What this drive does not determine': self.undetermined,
                 'Repairs and choices': self.notes}
 
     def data(self) -> dict[str, object]:
@@ -222,7 +222,7 @@ def _missing(recording: Recording, parts: Sequence[rec.Segment], moving: float,
 
 def _related(related: Sequence[Relation]) -> Table:
     """Return what each stream says of the others, without a model of the robot."""
-    return Table('Sensors against each other (factor: reference over source)', (
+    return Table('Sensors compared with each other (factor: reference over source)', (
         'quantity', 'source', 'reference', 'factor', 'source is late by [s]', 'explained'), tuple(
         (one.quantity, one.source, one.reference, _number(one.factor, 4), _number(one.late, 2),
          f'{100.0 * max(one.explained, 0.0):.0f} %') for one in related))
@@ -237,12 +237,13 @@ def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relati
     said = [one.statement for one in faults(related)]
     for one in differences(related, husky.parameters):
         said.append(one.statement if not one.on_ground else (
-            f'this is no Husky: {one.statement} (or wheel rates are scaled); give its dimensions '
+            f'this is not a Husky: {one.statement} (or wheel rates are scaled); give its '
+            'dimensions '
             'in a model file of its own'))
     fastest = max((float(np.abs(series.column('forward')).max()) for name, series in
                    recording.streams.items() if name == 'command' and len(series)), default=0.0)
     if fastest > limits()['fastest_husky']:
-        said.append(f'{fastest:.2f} m/s are commanded: no Husky drives so fast (1.0 m/s)')
+        said.append(f'{fastest:.2f} m/s are commanded, faster than any Husky drives (1.0 m/s)')
     said += _silences(recording)
     return tuple(said)
 

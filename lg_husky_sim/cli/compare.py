@@ -28,18 +28,19 @@ from lg_husky_sim.cli.several import SeveralWords
               help='Folder for index.html, compare.json, compare.txt and the pictures.')
 @click.option('--rival', 'rivals', multiple=True, metavar='BAG', type=RECORDING,
               help='A recording of the same drive by another simulator, one for each REC in '
-                   'their order, to stand beside the models.')
+                   'their order, to be compared as well.')
 @settings_option
 @topics_option
 @click.option('--horizon', type=float, default=0.0, metavar='SECONDS',
-              help='Restart from the measured state every so many seconds; by default only at '
+              help='Restart from the measured state at this interval; by default only at '
                    'gaps.')
 @click.option('--figures', 'most', type=click.IntRange(min=0), default=6, show_default=True,
               metavar='N',
-              help='Recordings whose signals and path are drawn as PNG too, the first ones.')
+              help='Number of recordings, from the first, whose signals and path are drawn as '
+                   'PNG too.')
 @click.option('--bag', type=click.Path(path_type=Path), metavar='BAG',
               help='Write measured, predicted and residual of the first REC as a rosbag2, with '
-                   'layouts for Foxglove and PlotJuggler beside it.')
+                   'layouts for Foxglove and PlotJuggler next to it.')
 @click.option('--trajectories', type=click.Path(path_type=Path), metavar='DIR',
               help='Write trajectories in the TUM format, for evo.')
 @spoken(page=True)

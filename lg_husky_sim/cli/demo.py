@@ -20,7 +20,7 @@ MARKER = 'summary.txt'
 @click.option('--manoeuvre', default='circle', show_default=True, metavar='NAME',
               help='One of the built-in manoeuvres.')
 @click.option('--model', default='', metavar='FILE.yaml',
-              help='Model file of the node, such as identify and diagnose write them.')
+              help='Model file for the node, as written by identify and diagnose.')
 def command(out: Path, manoeuvre: str, model: str) -> None:
     """
     Start the node, send it a manoeuvre from another process, record it and draw the result.

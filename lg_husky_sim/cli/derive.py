@@ -29,7 +29,7 @@ PAPER = ('simplified', 'expanded')
               help='Draw the graph into FILE (.svg, .png or .pdf).')
 @click.option('--export', 'exports', multiple=True, type=click.Path(path_type=Path),
               metavar='FILE',
-              help='Write A, B, C and D in numbers: .json, .mat, .npz, .h (C), .tex or .py '
+              help='Write numeric A, B, C and D: .json, .mat, .npz, .h (C), .tex or .py '
                    '(python-control, scipy); may be given several times.')
 @spoken()
 def command(model: str, outputs: tuple[str, ...], by_parameter: bool, latex: bool,

@@ -26,7 +26,7 @@ from lg_husky_sim.cli.several import SeveralWords
                    'and the pictures.')
 @click.option('--baseline', 'baselines', multiple=True, metavar='REC [REC …]', type=RECORDING,
               help='Recordings of the same robot before a change; then the question is what '
-                   'changed. Give the recordings after it first, or behind --.')
+                   'changed. Put the recordings after the change first, or after --.')
 @model_option('--robot', '--model', 'robot')
 @settings_option
 @topics_option
@@ -45,9 +45,9 @@ def command(
     """
     Find the physics that a model lacks, where it shows, and how much it improves the fit.
 
-    The model is recalibrated first, within the tolerances of its parameters. What is left is
-    compared with every effect of the catalogue; one is adopted only if it explains more than
-    chance does at a stated false-alarm rate. A folder stands for all bags in it.
+    The model is recalibrated first, within the tolerances of its parameters. The remaining
+    residual is compared with every effect of the catalogue; one is adopted only if it explains
+    more than chance does at a stated false-alarm rate. A folder stands for all bags in it.
     """
     from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.folders import check_folder

@@ -18,15 +18,15 @@ from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, Ro
 @click.option('--type', 'kind', type=click.Choice(['Twist', 'TwistStamped']),
               help='Message type, if not that of the preset.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
-              type=click.FloatRange(min=0.0), help='How long to wait for a listener.')
+              type=click.FloatRange(min=0.0), help='How long to wait for a subscriber.')
 def command(manoeuvre: str, preset: str | None, namespace: str | None, topic: str | None,
             kind: str | None, wait: float) -> None:
     """
     Send a built-in manoeuvre (circle, s_bend, obstacle, …) or one from a file, in real time.
 
-    A real Husky that listens in this ROS domain moves too: look before you drive. The nodes
-    that listen are printed first, commands stay within the limits of the preset, and zero commands
-    are sent last, however it ends (done, Ctrl-C, an error, a signal).
+    A real Husky in this ROS domain moves too: clear the area first. The subscribing nodes are
+    printed first, commands stay within the limits of the preset, and zero commands are sent last,
+    however it ends (done, Ctrl-C, an error, a signal).
     """
     from lg_husky_sim.manoeuvres import find_manoeuvre, load_manoeuvre
     from lg_husky_sim.ros.driver import drive, NAME

@@ -8,10 +8,10 @@ import click
 from lg_husky_sim.cli.common import EFFECT, Output, spoken
 
 
-@click.command(short_help='List the catalogue of effects, or the numbers of one.')
+@click.command(short_help='List the catalogue of effects, or the parameters of one.')
 @click.argument('effect', required=False, metavar='[ID]', type=EFFECT)
 @spoken()
 def command(effect: str | None, say: Output) -> None:
-    """List the effects that a model can have and a diagnosis can find, or the numbers of one."""
+    """List the effects that a model can have and diagnose can find, or the parameters of one."""
     from lg_husky_sim.api.lists import list_effects
     say.result(list_effects(effect))

@@ -23,7 +23,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='DIR',
               help='Folder for index.html, evaluation.json, evaluation.txt and the pictures.')
 @click.option('--case', 'cases', multiple=True, type=click.Choice(['synthetic', 'engine']),
-              help="The robot: the paper's graph with other numbers and noisy sensors, or a "
+              help="The robot: the paper's graph with other parameters and noisy sensors, or a "
                    'rigid-body engine (needs MuJoCo). By default both, the engine only where '
                    'MuJoCo is installed; neither if recordings are given.')
 @click.option('--calibrate', multiple=True, metavar='REC', type=RECORDING,
@@ -35,7 +35,7 @@ from lg_husky_sim.cli.several import SeveralWords
                    'their order.')
 @click.option('--steps', 'steps', multiple=True, metavar='REC [REC …]', type=RECORDING,
               help='A recording of commanded steps: fit every other step, predict the rest, '
-                   'beside three simple models; may be given several times.')
+                   'compared with three simple models; may be given several times.')
 @model_option('--model')
 @settings_option
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,

@@ -25,13 +25,13 @@ from lg_husky_sim.cli.several import SeveralWords
                short_help='Estimate parameters from recordings; a model file and a report.')
 @click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]', type=RECORDING)
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='FILE.yaml',
-              help='Model file to write; the report stands beside it as .txt, .json and .html. '
+              help='Model file to write; the report is next to it as .txt, .json and .html. '
                    'With --each a folder that gets these files for every recording.')
 @model_option('--model')
 @settings_option
 @click.option('--free', multiple=True, metavar='NAMES', type=PARAMETERS,
               help='Parameters to estimate, separated by commas; by default those that the model '
-                   'marks as free, and the numbers of its effects.')
+                   'marks as free, and the parameters of its effects.')
 @click.option('--effects', multiple=True, metavar='IDS', type=EFFECTS,
               help='Effects of the catalogue to add, separated by commas: id, id:side or '
                    'id:shape, such as speed_loop,command_latency,command_limit:yaw.')
@@ -44,7 +44,7 @@ from lg_husky_sim.cli.several import SeveralWords
                    'latency, delay_wheels, delay_imu, delay_pose, gyro_bias; and initial_state, '
                    'the state at the start of every segment that begins in motion.')
 @click.option('--profile', multiple=True, metavar='NAMES', type=PARAMETERS,
-              help='Parameters to give a likelihood profile, separated by commas: intervals '
+              help='Parameters to profile, separated by commas: likelihood intervals '
                    'that hold for non-quadratic likelihoods too, at the cost of more '
                    'simulations.')
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
@@ -56,7 +56,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.option('--scheduler', metavar='ADDRESS',
               help='Dask scheduler to use in place of processes, such as tcp://10.0.0.1:8786.')
 @click.option('--each', is_flag=True,
-              help='Fit every recording on its own in place of all together.')
+              help='Fit every recording separately instead of all together.')
 @topics_option
 @spoken(page=True)
 def command(
@@ -69,7 +69,7 @@ def command(
     Estimate the parameters of a model from recordings.
 
     The model file can be read by sim_node, simulate and compare. The report says how well each
-    parameter is determined, and which of them the recordings cannot tell apart. A folder stands
+    parameter is determined, and which of them the recordings cannot distinguish. A folder stands
     for all bags in it.
     """
     from lg_husky_sim.api.robots import Husky

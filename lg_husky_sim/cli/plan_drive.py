@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from lg_husky_sim.manoeuvres import Manoeuvre
 
 
-@click.command(short_help='Find the drive that tells two explanations apart.')
+@click.command(short_help='Find the drive that best distinguishes two explanations.')
 @click.argument('folder', required=False, type=click.Path(path_type=Path), metavar='[DIR]')
 @click.option('--effects', metavar='A,B',
               help='Two ids of the catalogue, at typical sizes, instead of a diagnosis; '
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 def command(folder: Path | None, effects: str | None, robot: Path | None, out: Path,
             max_speed: float, max_yaw: float, say: Output) -> None:
     """
-    Write the drive that best tells the first two explanations of a diagnosis apart.
+    Write the drive that best distinguishes the first two explanations of a diagnosis.
 
     DIR is the folder of a diagnosis. Each explanation is simulated on a list of drives and
-    the other one refitted to it; the drive on which neither can imitate the other wins.
+    the other one is refitted to it; the best drive is that on which neither can imitate the other.
     """
     from lg_husky_sim.api.tables import Table
     from lg_husky_sim.diagnosis.planning import drives, plan
@@ -67,7 +67,7 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
           'evidence_nats': row.nats, 'channel': row.channel} for row in ranked])
     say.written(out, f': {best.manoeuvre.name}, {best.manoeuvre.about}')
     if best.nats < setting('decisive'):
-        say.remark('None of these drives is decisive: another sensor is needed, or more speed.')
+        say.remark('None of these drives is decisive: another sensor or a higher speed is needed.')
 
 
 def _from_ids(text: str, robot: Path | None) -> tuple[Rival, Rival]:
@@ -103,7 +103,7 @@ def _from_folder(folder: Path) -> tuple[Rival, Rival]:
     rivals = [(effect, side) for effect, side in rivals if effect != name]
     if not finding or name == 'unknown' or not rivals:
         raise SettingsError(
-            f'{place} names no effect with a competing one, so there is nothing to tell apart')
+            f'{place} names no effect with a competing one, so there is nothing to distinguish')
     plain, model = load_model(folder / 'plain.yaml'), load_model(folder / 'model.yaml')
     first = next((e for e in model.structure.effects
                   if e.id == name and e not in plain.structure.effects), None)

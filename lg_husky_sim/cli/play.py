@@ -18,15 +18,15 @@ from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, Ro
 @click.option('--speed', default=1.0, show_default=True, type=click.FloatRange(0.01, 100.0),
               help='Speed of playing, as a multiple of the recorded one.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
-              type=click.FloatRange(min=0.0), help='How long to wait for a listener.')
+              type=click.FloatRange(min=0.0), help='How long to wait for a subscriber.')
 def command(recording: Path, preset: str | None, namespace: str | None, topics: tuple[str, ...],
             speed: float, wait: float) -> None:
     """
     Send command, joint states, IMU and odometry of a recording, stamped now.
 
-    A real Husky that listens to the command topic in this ROS domain moves: look before you play.
-    The nodes that listen are printed first, commands stay within the limits of the preset, and
-    zero commands are sent last, however it ends.
+    A real Husky in this ROS domain that subscribes to the command topic moves: clear the area
+    first. The subscribing nodes are printed first, commands stay within the limits of the preset,
+    and zero commands are sent last, however it ends.
     """
     from lg_husky_sim.recording import read_recording, TopicMap
     from lg_husky_sim.ros.player import NAME, play

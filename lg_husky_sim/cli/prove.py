@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-@click.command(short_help='Try the diagnosis blind on robots with hidden physics.')
+@click.command(short_help='Run a blind trial of the diagnosis on robots with injected effects.')
 @click.option('--cases', type=click.IntRange(1, 5000), default=30, show_default=True,
               help='How many robots.')
 @click.option('--seed', type=click.IntRange(0), metavar='N',
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 @click.option('--out', type=click.Path(path_type=Path), metavar='DIR',
               help='Folder of the trial; the same call resumes an interrupted one.')
 @click.option('--given', type=click.Path(path_type=Path, exists=True, file_okay=False),
-              metavar='DIR', help='Cases that somebody else made (DIR/cases, DIR/answers) '
-                                  'instead of generated ones.')
+              metavar='DIR', help='Cases by other authors (DIR/cases, DIR/answers) instead of '
+                                  'generated ones.')
 @click.option('--held-out/--no-held-out', default=True,
               help='Measure the share of the achievable improvement on drives not shown.')
 @click.option('--generate-only', is_flag=True, help='Make and seal the cases; diagnose nothing.')
@@ -39,19 +39,19 @@ if TYPE_CHECKING:
               help='Score the cases that are diagnosed already; diagnose nothing.')
 @click.option('--from', 'sources', multiple=True, metavar='FILE.jsonl',
               type=click.Path(path_type=Path, exists=True, dir_okay=False),
-              help='Outcomes of earlier trials: make tables and page from them; simulate nothing.')
+              help='Outcomes of earlier trials: compute tables and page; simulate nothing.')
 @click.option('--calibrate', is_flag=True,
-              help='With --from: print the coefficients of the confidence that these outcomes '
-                   'make likeliest, as they stand in diagnosis.yaml.')
+              help='With --from: print the maximum-likelihood coefficients of the confidence for '
+                   'these outcomes, in the form of diagnosis.yaml.')
 @click.option('--page', type=click.Path(path_type=Path), metavar='FILE.md',
-              help='Also write the results as a page, with pictures and outcomes beside it.')
+              help='Also write the results as a page, with pictures and outcomes next to it.')
 def command(
     cases: int, seed: int | None, tuning: bool, world: str, jobs: int, out: Path | None,
     given: Path | None, held_out: bool, generate_only: bool, score_only: bool,
     sources: tuple[Path, ...], calibrate: bool, page: Path | None,
 ) -> None:
     """
-    Try the diagnosis blind on robots with hidden physics.
+    Run a blind trial of the diagnosis on robots with injected effects.
 
     A generator that shares no code with the diagnosis makes the recordings; the answers are
     sealed before the first diagnosis and opened after the last. DIR gets the recordings, the
@@ -72,11 +72,12 @@ def command(
         return
     if sources:
         if out or given or generate_only or score_only:
-            raise CommandError('--from makes figures of earlier trials; it goes with --page only')
+            raise CommandError('--from recomputes the figures of earlier trials; it can be '
+                               'combined with --page only')
         _report([(path, *outcomes.read(path)) for path in sources], page, sources)
         return
     if out is None:
-        raise CommandError('--out DIR is missing: where the trial is kept')
+        raise CommandError('--out DIR is missing: the folder of the trial')
     path = _trial(cases, seed, tuning, world, jobs, out, given, held_out, generate_only,
                   score_only)
     if path is not None:

@@ -19,7 +19,7 @@ _KEY = 'lg_husky_sim.ros_args'
 _Verb = TypeVar('_Verb', bound=Callable[..., object])
 
 ROS_HELP = """\b
-ROS arguments go behind --ros-args, as for every ROS node:
+ROS arguments go after --ros-args, as for every ROS node:
   -r __ns:=/a200_0000     namespace (also --namespace, ROS_NAMESPACE)
   -r FROM:=TO             another topic
   -p NAME:=VALUE          a parameter of sim_node (imu_topic, max_forward, …)

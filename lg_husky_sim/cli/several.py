@@ -39,7 +39,7 @@ class SeveralWords(click.Command):
                     len(flags) == 1 or self._after_each(args) != [1] * (len(flags) - 1)):
                 raise click.UsageError(
                     f'all words follow {flags[0]}, which takes several: put '
-                    f'{needed.metavar or needed.name} before it, or behind --', ctx)
+                    f'{needed.metavar or needed.name} before it, or after --', ctx)
             words = alone
         return super().parse_args(ctx, words)
 

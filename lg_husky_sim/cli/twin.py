@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=RosVerb, epilog=ROS_HELP,
-               short_help='Run models beside a live robot; show how far each is off.')
+               short_help='Run models alongside a live robot; show their errors.')
 @click.option('--model', required=True, type=click.Path(path_type=Path), metavar='FILE.yaml',
               help='Model file, such as the model.yaml of a diagnosis.')
 @click.option('--plain', type=click.Path(path_type=Path), metavar='FILE.yaml',
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
               type=click.FloatRange(min=0.05),
               help='Time between two printed lines, and between two publications.')
 @click.option('--pose-topic', metavar='TOPIC',
-              help='Odometry that tells where the robot really is (filtered, ground truth); the '
-              'models are held to it.')
+              help='Odometry with the true pose of the robot (filtered, ground truth); the '
+              'models are kept at it.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
               type=click.FloatRange(min=0.0), help='How long to look for a Husky.')
 def command(model: Path, plain: Path | None, preset: str | None, namespace: str | None,
             seconds: float | None, every: float, pose_topic: str | None, wait: float) -> None:
     """
-    Listen to a robot's commands, joint states and IMU, and run two models beside it.
+    Subscribe to a robot's commands, joint states and IMU, and run two models alongside.
 
     The running errors (root mean square, the last 10 s) are printed and published as
     std_msgs/Float64 on twin/plain/wheel_rate_error, twin/model/yaw_rate_error, …; for plots
@@ -83,4 +83,4 @@ def _errors(twin: Twin, which: str) -> str:
             change = f' ({100.0 * (after / before - 1.0):+.0f} %)' if before > 0.0 else ''
             words.append(f'{quantity.replace("_", " ")}: plain {before:.4f}, model {after:.4f} '
                          f'{unit}{change}')
-    return '; '.join(words) or 'nothing heard yet'
+    return '; '.join(words) or 'nothing received yet'

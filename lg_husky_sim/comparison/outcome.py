@@ -81,7 +81,8 @@ class RecordingOutcome:
         shares = {name: min((n / most[channel] for channel, n in count.items() if most[channel]),
                             default=1.0) for name, count in counts.items()}
         # A sample or two at the ends is no part of a drive.
-        return [f'the errors of {name} are over a part of the drive, down to {share:.0%} of the '
+        return [f'the errors of {name} cover only a part of the drive, as little as {share:.0%} '
+                'of the '
                 'samples of the others' for name, share in shares.items() if share < 0.99]
 
 

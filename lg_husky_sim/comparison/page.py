@@ -155,7 +155,7 @@ def _headline(table: ErrorTable, recordings: int, seconds: float) -> Headline:
     return Headline(
         f'Closest to the recordings: {best}', facts=facts,
         sentences=(f'Its root mean square {quantity(key)} error is '
-                   f'{with_unit(values[best], unit)}; the next one has '
+                   f'{with_unit(values[best], unit)}; that of the next is '
                    f'{with_unit(second, unit)}.',))
 
 
@@ -172,6 +172,7 @@ def _scatter_notes(traces: Sequence[Trace]) -> list[str]:
         scatter = float(np.median(np.abs(bends))) / 0.6745 / math.sqrt(6.0)
         if scatter > SCATTER * min(float(np.sqrt(np.nanmean(error ** 2))) for error in errors):
             said.append(f'{trace.recording}: the measured forward speed is the rate of change of '
-                        f'the pose, and scatters by at least {number(scatter, 2)} m/s by itself: '
-                        'that much of its error is not due to a model.')
+                        f'the pose, and has a scatter of at least {number(scatter, 2)} m/s of '
+                        'its own: '
+                        'that part of its error is not due to a model.')
     return said

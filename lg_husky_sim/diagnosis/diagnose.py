@@ -104,7 +104,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     drives = drives_of(recordings)
     names = [r.name for r in recordings]
     parts = tuple(s for r in recordings for s in segments(r))
-    progress('sensors against each other', 0.01)
+    progress('comparing the sensors', 0.01)
     related = relations(parts)
     seen, different = faults(related), differences(related, nominal.parameters)
     numbers = nominal.parameters.replacing({k: v for d in different for k, v in d.numbers.items()})
@@ -209,7 +209,7 @@ def _remaining(found: Search, rest: Sequence[Effort]) -> str:
     if last.tried and not (found.found and last is found.rounds[len(found.found) - 1]):
         best = last.tried[0]
         text.append(f'the best further effect, {best.hypothesis.effect.id}, gains '
-                    f'{best.gain:.1f} nats; on a robot that lacks nothing, a gain this large '
+                    f'{best.gain:.1f} nats; on a clean robot, a gain this large '
                     f'has a probability of {last.chance:.2g}')
     return '; '.join(text) or 'nothing beyond noise'
 
@@ -232,7 +232,7 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
     periods = [d.clock.period for d in found.evidence.drives if d.clock is not None]
     if periods:
         notes.append('the base seems to apply commands at its own ticks, every '
-                     f'{1e3 * float(np.mean(periods)):.3g} ms, not when they come')
+                     f'{1e3 * float(np.mean(periods)):.3g} ms, not when they arrive')
     values = found.evidence.noise.values
     notes.append(f'estimated disturbances (standard deviation): force {values["force"]:.2g} '
                  f'N, yaw moment {values["moment"]:.2g} N·m, torque on the wheels of each side '

@@ -77,12 +77,12 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
             lines.append(f'    {evidence}competing effects: '
                          f'{", ".join(rivals) or "none with a gain"}')
     for group in diagnosis.indistinguishable:
-        lines.append(f'  cannot be told apart: {", ".join(group.effects)}; '
+        lines.append(f'  indistinguishable: {", ".join(group.effects)}; '
                      f'would separate them: {"; ".join((*group.sensors, *group.manoeuvres))}')
     lines += _error_lines(diagnosis)
     if diagnosis.fits:
         lines.append(f'  remaining: {diagnosis.remaining}')
-    lines.extend(f'  sensors against each other: {text}'
+    lines.extend(f'  sensors compared with each other: {text}'
                  for text in unexplained_sensors(diagnosis))
     lines.extend(f'  note: {note}' for note in diagnosis.notes)
     return '\n'.join(lines)

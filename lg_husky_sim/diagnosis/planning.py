@@ -210,7 +210,7 @@ def recorded(rival: Rival, manoeuvre: Manoeuvre) -> Drive:
         manoeuvre.name, 0, float(commands.times[0]), float(commands.times[-1]),
         {name: streams[name] for name in ('command', 'wheels', 'wheel_angles', 'imu', 'pose')}))
     if drive is None:
-        raise DiagnosisError(f'{manoeuvre.name} is too short to tell anything apart')
+        raise DiagnosisError(f'{manoeuvre.name} is too short to distinguish anything')
     return drive
 
 

@@ -204,7 +204,8 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
         tell = '; '.join((*group.sensors, *group.manoeuvres))
         names = ', '.join(name.replace('_', ' ') for name in group.effects)
         if tell:
-            robot.append(f'Before repairing anything: these recordings cannot tell {names} apart. '
+            robot.append('Before repairing anything: these recordings do not distinguish '
+                         f'{names}. '
                          f'These would: {tell}.')
     if diagnosis.fits or diagnosis.model != diagnosis.plain_model:
         simulator.append(f'Load the {_which(diagnosis)}: `ros2 run lg_husky_sim sim_node '
@@ -218,7 +219,7 @@ def _which(diagnosis: Diagnosis) -> str:
     if not diagnosis.findings or diagnosis.model == diagnosis.plain_model:
         return 'recalibrated model'
     return 'model with the finding' if diagnosis.fits else (
-        'commercial base, the beginning of a model of this robot')
+        'commercial base, a starting point for a model of this robot')
 
 
 def _stream_words(finding: Finding, shape: str) -> dict[str, float | str]:
@@ -333,7 +334,8 @@ def report_data(
              if not diagnosis.fits else
              'refitted with a smooth description of what is missing'}
     remains = diagnosis.remaining if diagnosis.fits else ''
-    notes = (*(f'sensors against each other: {text}' for text in unexplained_sensors(diagnosis)),
+    notes = (*(f'sensors compared with each other: {text}'
+               for text in unexplained_sensors(diagnosis)),
              *diagnosis.notes,
              *((f'what remains: {remains}',) if remains else ()))
     warnings = (*losses(errors), *(implausible(parameters) if diagnosis.fits else ()))

@@ -81,7 +81,7 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
         traces_of(parts, columns), tables, _parameters(case),
         shapes={(e.id, e.side): e.shape for e in diagnosis.model.structure.effects},
         sections=(*_tried('Where in the model', lambda: _where(case)),
-                  *_tried('A drive that would tell more', lambda: _telling(case))),
+                  *_tried('A more informative drive', lambda: _telling(case))),
         provenance=provenance)
 
 
@@ -200,7 +200,7 @@ def _telling(case: Case) -> tuple[Section, ...]:
     plain, first = case.diagnosis.plain_model, case.diagnosis.indistinguishable[0]
     drive = named_drive(first.effects, plain.structure, plain.parameters)
     names = ', '.join(f'`{name}`' for name in first.effects)
-    return () if not drive else (Section('A drive that would tell more', (
+    return () if not drive else (Section('A more informative drive', (
         f'These recordings cannot tell {names} apart. By simulation, this drive can: {drive}. '
         '`lg_husky plan-drive` computes the best one and writes it as a command script.',)),)
 

@@ -123,15 +123,16 @@ def verdict(result: CaseResult) -> list[str]:
                 f'{name} {config["nominal"][name]} → {value}'
                 for name, value in config['robot'].items())
             said.append(
-                f'Closest to the robot: {closer}. Robot and nominal engine obey one physics and '
-                f'differ in numbers alone ({changed}); the graph has simpler physics but was '
+                f'Closest to the robot: {closer}. Robot and nominal engine have the same physics '
+                'and '
+                f'differ only in parameters ({changed}); the graph has simpler physics but was '
                 'calibrated on the circle. An uncalibrated engine is not a reference: '
-                'what it lacks is not physics but these numbers.')
+                'it lacks these parameter values, not physics.')
         elif result.case.name == 'synthetic':
             said.append(
                 f'Closest to the robot: {closer}. Here the robot is the graph itself, so the '
-                "engine's distance is that between two kinds of physics, dry sliding against "
-                'viscous slip, and between two sets of numbers.')
+                'error of the engine comes from different physics, dry sliding instead of '
+                'viscous slip, and from different parameters.')
     return said
 
 

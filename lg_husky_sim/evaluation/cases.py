@@ -67,7 +67,7 @@ def synthetic_case(seed: int) -> Case:
         recordings[name] = sensed(name, commands, truth, draws, config['sensors'])
     # The engine stands beside it where it is installed; nothing else here needs it.
     rivals = _nominal_runs() if find_spec('mujoco') is not None else {}
-    return Case('synthetic', "the paper's graph with other numbers, and sensor noise",
+    return Case('synthetic', "the paper's graph with other parameters, and sensor noise",
                 recordings, rivals, 'engine, nominal')
 
 

@@ -57,11 +57,12 @@ class Structure:
         """Check the effects against the onset."""
         for effect in self.effects:
             if effect.late and self.onset is None:
-                raise ParameterError(f'effect {effect.id} is late, but there is no onset')
+                raise ParameterError(f'effect {effect.id} begins at an onset, but the model has '
+                                     'none')
             if effect.again and not any((e.id, e.side, e.again) == (effect.id, effect.side, False)
                                         for e in self.effects):
                 raise ParameterError(
-                    f'effect {effect.id} is there again, but it was not there before')
+                    f'effect {effect.id} is changed at the onset, but does not exist before it')
 
     def with_effect(self, effect: Effect, onset: Onset | None = None) -> Structure:
         """Return this structure with one effect more; a belt needs the expanded drivetrain."""
@@ -234,8 +235,8 @@ def _compiled(drivetrain: Drivetrain, effects: tuple[Effect, ...]) -> tuple[_Reg
         regimes.insert(0, _regime(early))
         if len(regimes[0].numeric.states) != len(regimes[1].numeric.states) or (
                 regimes[0].edited.speed_loop != regimes[1].edited.speed_loop):
-            raise ParameterError('a late effect may not add states: '
-                                 f'{", ".join(always_on())} are always on')
+            raise ParameterError('an effect with an onset may not add states: '
+                                 f'{", ".join(always_on())} are always active')
     return tuple(regimes)
 
 

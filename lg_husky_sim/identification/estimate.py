@@ -280,7 +280,8 @@ def _disagreement(ends: Ends, sure: Confidence) -> list[str]:
         if max(varied) - min(varied) > APART * deviation:
             apart.add(unknown.name)
     if apart:
-        said.append(f'starts disagree: {len(equal)} ends fit equally well but differ in '
+        said.append(f'starting points disagree: {len(equal)} optima fit equally well but differ '
+                    'in '
                     f'{", ".join(sorted(apart))}')
     if len(worse) * 2 > len(ends.all):
         said.append(f'{len(worse)} of {len(ends.all)} starts ended in a worse local minimum, so '

@@ -37,12 +37,12 @@ def linear(space: StateSpace) -> StateSpace:
     Raises
     ------
     SettingsError
-        If the outputs hang on the rate of change of an input: such a model is not proper.
+        If the outputs depend on the rate of change of an input: such a model is not proper.
     """
     proper = space.standard_form()
     if proper.F.any():
         raise SettingsError(
-            'outputs hang on the rate of change of an input (matrix F is not zero); only .json, '
+            'outputs depend on the rate of change of an input (matrix F is not zero); only .json, '
             '.mat and .npz can hold such a model')
     return proper
 
@@ -183,7 +183,7 @@ def _as_c(space: StateSpace, name: str, parameters: Mapping[str, float]) -> byte
     lines = [f'/* {_comment(name)}: dx/dt = A x + B u, y = C x + D u; SI units.',
              *(f' *   {letter}: {", ".join(names)}' for letter, names in
                (('x', own.states), ('u', own.inputs), ('y', own.outputs))),
-             *([f' * Laws that are not linear are left out: {", ".join(own.efforts)}']
+             *([f' * Non-linear laws are left out: {", ".join(own.efforts)}']
                if own.efforts else []), ' */',
              '#ifndef LG_HUSKY_MODEL_H', '#define LG_HUSKY_MODEL_H', '']
     lines += [f'#define LG_HUSKY_{word} {len(names)}' for word, names in
@@ -199,7 +199,7 @@ def _as_c(space: StateSpace, name: str, parameters: Mapping[str, float]) -> byte
 
 def _as_latex(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
     own = linear(space)
-    left_out = [f'% Laws that are not linear are left out: {", ".join(own.efforts)}'
+    left_out = [f'% Non-linear laws are left out: {", ".join(own.efforts)}'
                 ] if own.efforts else []
     lines = [f'% {_comment(name)}; needs amsmath',
              *(f'% {letter}: {", ".join(names)}' for letter, names in
@@ -213,7 +213,7 @@ def _as_latex(space: StateSpace, name: str, parameters: Mapping[str, float]) -> 
 
 def _as_python(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
     own = linear(space)
-    left_out = f'\n\nLaws that are not linear are left out: {", ".join(own.efforts)}.' if (
+    left_out = f'\n\nNon-linear laws are left out: {", ".join(own.efforts)}.' if (
         own.efforts) else ''
     matrices = '\n'.join(f'{key} = {getattr(own, key).tolist()!r}' for key in 'ABCD')
     names = '\n'.join(f'{key} = {list(getattr(own, key))!r}' for key in _NAMES[:3])

@@ -49,9 +49,9 @@ def effort_order(direct: NDArray[np.bool_], counts: Sequence[int], efforts: Sequ
         for effort, found in causes.items():
             for cause, argument in found.items():
                 raise GraphError(
-                    f'the argument {argument} of the non-linear law of {efforts[effort]!r} hangs '
-                    f'at once on the effort of {efforts[cause]!r}; put a storage between them, '
-                    'make one law linear, or compile with chained=True')
+                    f'the argument {argument} of the non-linear law of {efforts[effort]!r} '
+                    f'depends directly on the effort of {efforts[cause]!r}; put an energy storage '
+                    'between them, make one law linear, or compile with chained=True')
     return tuple(order)
 
 
@@ -62,9 +62,9 @@ def _visit(effort: int, causes: dict[int, dict[int, str]], order: list[int], pat
         steps = [efforts[effort]]
         for later, earlier in itertools.pairwise(loop):
             steps += [causes[later][earlier], efforts[earlier]]
-        raise GraphError(f'algebraic loop {" <- ".join(steps)}: a non-linear law hangs at once '
-                         'on itself; put a storage into the loop (an A-type in parallel or a '
-                         'T-type in series), or make the law linear')
+        raise GraphError(f'algebraic loop {" <- ".join(steps)}: a non-linear law depends '
+                         'directly on itself; put an energy storage into the loop (an A-type in '
+                         'parallel or a T-type in series), or make the law linear')
     if effort in order:
         return
     for cause in causes[effort]:

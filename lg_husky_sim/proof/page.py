@@ -15,21 +15,21 @@ from lg_husky_sim.proof.settings import settings
 Json = Mapping[str, Any]
 
 _ABOUT = """\
-This page is written from files of outcomes, one JSON line a case; nobody edits its figures. All
-of them are computed again, in seconds, by
+This page is generated from files of outcomes, with one JSON line per case; its figures are never
+edited by hand. All of them are recomputed, in seconds, by
 
     lg_husky prove {sources} --page docs/proof.md
 
-A generator that shares no code with the diagnosis hides physics in a robot, drives it,
-and publishes rosbags ([how](proof_generator.md)). The answers are sealed: the SHA-256 of each
-salted answer is written down before the first diagnosis. Then `lg_husky diagnose` is called as
-any user would call it, with the recordings and what a ruler says of the robot.
+A generator that shares no code with the diagnosis injects effects into a robot, drives it, and
+writes rosbags ([how](proof_generator.md)). The answers are sealed: the SHA-256 of each salted
+answer is recorded before the first diagnosis. Then `lg_husky diagnose` is called as any user would
+call it, with the recordings and the dimensions of the robot.
 
-What nobody should rely on is drawn over decades: roughness of the floor, noise, ticks, how wheel
-speeds are made, stamps, jitter, rates, the base's own clock, lost and late messages, missing
-sensors, lengths, the form of each law. Tuning never sees some families of them
-(`left_out_of_tuning` in `config/blind_trial.yaml`). A reported set is used once; its seeds are
-refused afterwards.
+Conditions that differ from log to log are drawn over orders of magnitude: roughness of the floor,
+noise, ticks, how wheel speeds are computed, stamps, jitter, rates, the base's own clock, lost and
+late messages, missing sensors, lengths, the form of each law. Some families of them are left out
+of tuning (`left_out_of_tuning` in `config/blind_trial.yaml`). A reported set is used once; its
+seeds are refused afterwards.
 """
 
 
@@ -132,20 +132,20 @@ def _reliability(stated: Json) -> list[str]:
              f'{_number(row["right"])} ({_number(row["low"])} to {_number(row["high"])})']
             for row in stated['bins']]
     mark = 'reached' if stated['error'] <= stated['target'] else 'missed'
-    return ['### Reliability: stated confidence against share right', '',
+    return ['### Reliability: stated confidence and share right', '',
             _markdown(('stated', 'cases', 'mean stated', 'right (95 % interval)'), rows), '',
             f'Expected calibration error {stated["error"]:.3f} over {stated["cases"]} cases '
             f'(target ≤ {stated["target"]:g}: {mark}); mean confidence '
             f'{_number(stated["mean_when_right"])} when right, '
-            f'{_number(stated["mean_when_wrong"])} when wrong. Cases whose effect hardly shows, '
-            'and of which nothing certain was said, do not count.', '']
+            f'{_number(stated["mean_when_wrong"])} when wrong. Undetectable effects with '
+            'a low stated confidence do not count.', '']
 
 
 def _regimes(rows: Sequence[Json]) -> list[str]:
     table = [[row['axis'], row['family'], _with_interval(row['named']),
               _with_interval(row['alarms'])] for row in rows
              if row['named']['count'] or row['alarms']['count']]
-    return ['### By world and by the way in which logs are made', '',
+    return ['### By world and by logging convention', '',
             _markdown(('axis', 'family', 'single effects named right', 'clean robots flagged'),
                       table), '']
 
@@ -161,9 +161,9 @@ def _gap(rates: Sequence[Json], stated: Json) -> list[str]:
             for rate in rates if rate['name'] in by_target]
     rows.append(['expected calibration error', _number(stated['error']),
                  *(_number(exam['calibration_error']) for exam in exams)])
-    return ['### Beside the exams of other authors', '',
-            'Those were sat by earlier states of the diagnosis; the gap is what a trial of '
-            "one's own cannot see.", '',
+    return ['### Compared with the exams of other authors', '',
+            'Those were taken by earlier states of the diagnosis; the gap shows what a trial with '
+            'our own generator cannot reveal.', '',
             _markdown(('question', 'here', *(exam['name'] for exam in exams)), rows), '']
 
 
@@ -181,10 +181,10 @@ def _section(title: str, results: Json, trials: Sequence[Json], full: bool) -> l
               for name, row in results['shares'].items() if row['count']]
     if spread:
         parts += ['### Held-out share of the achievable improvement', '',
-                  'Of the errors, on drives that no diagnosis saw, that a refitted paper model '
-                  'makes and the hidden robot without noise does not.', '',
+                  'Share of the error of a refitted paper model, relative to the noiseless true '
+                  'robot, on drives that no diagnosis has seen.', '',
                   _markdown(('cases', 'number', 'median', 'quartiles'), spread), '']
-    parts += ['### What was said of each effect', '', _markdown(
+    parts += ['### Answers for each effect', '', _markdown(
         ('hidden', 'cases', 'right', 'part right', 'said instead'),
         [[name, str(row['count']), str(row['right']), str(row['part']),
           ', '.join(f'{other} {count}' for other, count in sorted(
@@ -197,7 +197,7 @@ def _section(title: str, results: Json, trials: Sequence[Json], full: bool) -> l
     if time['count']:
         parts += [f'Run time: median {time["median"]:.1f} s, quartiles '
                   f'{time["lower_quartile"]:.1f} to {time["upper_quartile"]:.1f} s, longest '
-                  f'{time["longest"]:.1f} s a case (process start included, report and pictures '
+                  f'{time["longest"]:.1f} s per case (process start included, report and pictures '
                   'left out).', '']
     return parts
 
@@ -228,8 +228,8 @@ def page_of(sections: Mapping[str, tuple[Json, Sequence[Json]]], sources: Sequen
     parts = ['# Proof: a blind trial', '', about, *textwrap.wrap(
         f'Left out of tuning: {left_out}.', 98), '']
     if 'report' not in sections:
-        parts += ['No set is reported at this state of the diagnosis: what follows was seen',
-                  'while it was tuned. A report is made by', '',
+        parts += ['No set is reported for this state of the diagnosis: the following cases were',
+                  'used for tuning. A report is made by', '',
                   '    lg_husky prove --report --cases 600 --seed 91000 --world mix '
                   '--out report --page docs/proof.md', '']
     for name, title in TITLES.items():

@@ -175,7 +175,7 @@ def _repaired(files: list[Path], scratch: Path) -> tuple[list[Path], list[str]]:
     if not cut:
         return files, []
     whole = [salvage(part, scratch) if part in cut else part for part in parts]
-    return whole, [f'{part.name} was cut off: read up to its last whole chunk' for part in cut]
+    return whole, [f'{part.name} is truncated: read up to its last complete chunk' for part in cut]
 
 
 def _reason(error: Exception) -> str:
@@ -191,4 +191,5 @@ def _advice(files: list[Path]) -> str:
     """Return how to repair a bag of this kind."""
     if files[0].suffix == '.bag':
         return ' (a damaged bag can often be repaired with `rosbag reindex`)'
-    return ' (a recording cut off can often be repaired with `ros2 bag reindex` or `mcap recover`)'
+    return (' (a truncated recording can often be repaired with `ros2 bag reindex` or '
+            '`mcap recover`)')

@@ -93,11 +93,11 @@ def common_clock(streams: Mapping[str, Stamps]) -> tuple[dict[str, IntArray], li
         drift = max((drift, *(_wander(streams[name], delay)
                               for name, delay in delays.items() if _is_main(name))))
     if drift > SKEW_NS:
-        notes.append(f'header clock and log clock drift by {drift * 1e-9:.1f} s: '
+        notes.append(f'header clock and log clock drift apart by {drift * 1e-9:.1f} s: '
                      'log times taken throughout')
         times = {name: stamps.logged for name, stamps in streams.items()}
     else:
-        notes += [f'{name}: header clock drifts by {apart * 1e-9:.1f} s: log times taken for it'
+        notes += [f'{name}: header clock drifts by {apart * 1e-9:.1f} s: log times used instead'
                   for name, apart in aside.items()]
         times = {name: headers[name] + _shift(name, reference, gaps[name], notes)
                  if name in delays else
@@ -138,7 +138,7 @@ def _headers(streams: Mapping[str, Stamps], notes: list[str]) -> dict[str, IntAr
             continue
         back = _step_back(stamps.logged, mended)
         if back:
-            notes.append(f'{name}: header time runs back by {back * 1e-9:.1f} s: '
+            notes.append(f'{name}: header time goes backwards by {back * 1e-9:.1f} s: '
                          'log times taken for it')
         else:
             headers[name] = mended
@@ -235,9 +235,9 @@ def _shift(name: str, reference: str, gap: IntArray, notes: list[str]) -> int:
         return 0
     if _late(name, apart):
         notes.append(f'{name} is stamped {-apart * 1e-9:.3f} s earlier than {reference} logged '
-                     'with it: late, or a clock of its own; left as it is')
+                     'with it: delayed, or on another clock; left unchanged')
         return 0
-    notes.append(f'{name} runs on a clock of its own: shifted by {-apart * 1e-9:.3f} s')
+    notes.append(f'{name} is on another clock: shifted by {-apart * 1e-9:.3f} s')
     return -apart
 
 
@@ -249,13 +249,13 @@ def _onto_headers(name: str, reference: str, streams: Mapping[str, Stamps],
     base, delay = streams[reference], delays[reference]
     if _wander(base, delay) > SKEW_NS:
         apart = _delay_at(streams[name].logged, base, delay)
-        notes.append(f'{name} has no header stamps of use: log times shifted by '
+        notes.append(f'{name} has no usable header stamps: log times shifted by '
                      f'{apart[0] * 1e-9:.3f} to {apart[-1] * 1e-9:.3f} s onto the header clock')
         return apart
     common = int(np.median(delay))
     if abs(common) <= SKEW_NS:
         return 0
-    notes.append(f'{name} has no header stamps of use: log times shifted by '
+    notes.append(f'{name} has no usable header stamps: log times shifted by '
                  f'{common * 1e-9:.3f} s onto the header clock')
     return common
 
@@ -272,7 +272,7 @@ def _mended(name: str, stamps: Stamps, notes: list[str]) -> IntArray | None:
         return None
     header, logged = stamps.header.copy(), stamps.logged
     if np.ptp(header[there]) == 0 and np.ptp(logged) > SKEW_NS:
-        notes.append(f'{name}: header stamps stand still: log times taken for it')
+        notes.append(f'{name}: header stamps do not advance: log times used instead')
         return None
     delay = (header - logged)[there]
     usual = np.empty(header.size, dtype=np.int64)
@@ -282,7 +282,7 @@ def _mended(name: str, stamps: Stamps, notes: list[str]) -> IntArray | None:
     header[wrong] = (logged + usual)[wrong]
     if np.any(wrong):
         notes.append(f'{name}: {np.count_nonzero(wrong)} of {wrong.size} header stamps are zero '
-                     'or out of line; log times taken for them')
+                     'or inconsistent; log times used for them')
     return header
 
 

@@ -82,7 +82,8 @@ class Collected:
         left_out = passed_over(self.seen) if self.named else []
         if left_out:
             more = f' and {len(left_out) - LISTED} more' if len(left_out) > LISTED else ''
-            self.notes.append('wheels: joints not called wheels, or of no side, were passed over: '
+            self.notes.append('wheels: joints that are not called wheels, or have no side, were '
+                              'ignored: '
                               + ', '.join(left_out[:LISTED]) + more)
         turned, self.turned = self.turned, None
         means = unwrapped_means(turned) if turned else None

@@ -150,7 +150,8 @@ def _recording(
 ) -> Recording:
     notes: list[str] = []
     if whose.others:
-        notes.append(f'topics of several robots: those of /{whose.home} are read, not those of '
+        notes.append(f'there are topics of several robots: those of /{whose.home} are used, not '
+                     'those of '
                      f'/{", /".join(whose.others)}; --topic chooses another')
     chain: tuple[Edge, ...] = ()
     rows: dict[str, Rows] = {}
@@ -176,7 +177,7 @@ def _recording(
                          'from the wheels, their slip does not show in it')
     if not rows:
         raise RecordingError('; '.join([
-            'no message of use: commands, wheels, imu or pose', *notes,
+            'no usable messages: commands, wheels, imu or pose', *notes,
             f'there are {listing(present)}']))
     times, repairs = common_clock({name: entry.stamps() for name, entry in rows.items()})
     notes += repairs

@@ -21,7 +21,7 @@ class Clockwork:
 
     The steady clock paces, so that no jump of another clock makes the robot stand or run. Only
     where somebody else is the authority on time (``use_sim_time`` without ``publish_clock``) the
-    steps follow /clock. Stamps never run back but with simulated time.
+    steps follow /clock. Stamps go backwards only with simulated time.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Clockwork:
                 self.resume(self._settings, total)
             elif now < self._last:
                 self._warn(f'/clock went back by {(self._last - now) / _SECOND:.3f} s; steps and '
-                           'stamps begin there anew')
+                           'stamps restart there')
                 self._last = 0
                 self.resume(self._settings, total)
             return
@@ -100,8 +100,8 @@ class Clockwork:
             self._stamps = Stamps(self._stamps.anchor_ns + moved, self._stamps.anchor_step,
                                   self._stamps.spacing)
         else:
-            self._warn(f'the clock jumped by {moved / _SECOND:+.3f} s; stamps never run back and '
-                       'go on as before')
+            self._warn(f'the clock jumped by {moved / _SECOND:+.3f} s; stamps never go '
+                       'backwards and continue as before')
 
     def due(self, total: int) -> int:
         """Return how many steps are due."""

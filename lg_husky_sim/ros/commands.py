@@ -114,7 +114,8 @@ class Commands:
         if others:
             return (f'{name}: {others[0].node} listens to {others[0].kind.rpartition("/")[2]} '
                     'there; choose --type or --preset')
-        return f'nobody listens to {name} after {seconds:g} s; is sim_node running in this domain?'
+        return (f'no node subscribes to {name} after {seconds:g} s; is sim_node running in '
+                'this domain?')
 
     def send(self, forward: float, yaw: float) -> None:
         """

@@ -103,7 +103,7 @@ def play(tool: Tool, streams: Mapping[str, TimeSeries], settings: Settings, *,
                 one.publisher.get_subscription_count() for one in senders.values()):
             tool.serve()
             if time.monotonic() > end:
-                raise RecordingError(f'nobody listens to any of the topics after {wait:g} s')
+                raise RecordingError(f'no node subscribes to any of the topics after {wait:g} s')
         commands.settle()
         _say_who(tool, commands, senders, told, say)
         tool.wait_for_time(wait)
@@ -145,8 +145,8 @@ def _say_who(tool: Tool, commands: Commands, senders: Mapping[str, _Stream], tol
     if robots:
         commands.wait(0.0, say)
     else:
-        say('no command goes out that moves a robot' if not told else
-            f'no robot listens to {commands.topic}')
+        say('no commands are sent that move a robot' if not told else
+            f'no robot subscribes to {commands.topic}')
     for topic, others in _others(tool, senders).items():
         if others:
             known = [one.node for one in others if one.is_named]

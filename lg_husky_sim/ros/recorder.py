@@ -201,7 +201,8 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
             present = ', '.join(name for name, _ in tool.node.get_topic_names_and_types()
                                 if name not in recorder.counts)
             raise RecordingError(
-                f'nothing came on {", ".join(recorder.counts)}; nothing is written. In the graph '
+                f'nothing was received on {", ".join(recorder.counts)}; nothing is written. In '
+                'the graph '
                 f'({api.describe_backend()}) there are: {present or "no topics"}')
         return recorder.counts
     finally:

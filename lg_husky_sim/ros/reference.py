@@ -21,16 +21,16 @@ PRESETS = ('paper', 'husky_ros1', 'clearpath_jazzy')
 _TOPICS = (
     ('command_topic', 'geometry_msgs/{command_type}', 'in', 'velocity command'),
     ('initial_pose_topic', 'geometry_msgs/PoseWithCovarianceStamped', 'in',
-     'puts the robot somewhere, at rest; with `publish_map_tf` only in the map'),
+     'sets the pose of the robot, at rest; with `publish_map_tf` only in the map'),
     ('odometry_topic', 'nav_msgs/Odometry', 'out', 'wheel odometry, every step'),
-    ('ground_truth_topic', 'nav_msgs/Odometry', 'out', 'truth of the model, every step'),
+    ('ground_truth_topic', 'nav_msgs/Odometry', 'out', 'ground truth of the model, every step'),
     ('joint_states_topic', 'sensor_msgs/JointState', 'out',
      'angle, rate and torque of four wheels, `joint_states_rate`'),
     ('imu_topic', 'sensor_msgs/Imu', 'out', 'gyro, accelerometer, orientation, `imu_rate`'),
     ('battery_topic', 'sensor_msgs/BatteryState', 'out',
      'voltage and current once a second, `publish_battery`'),
     ('scan_topic', 'sensor_msgs/LaserScan', 'out', 'laser scan, best effort, `scan`'),
-    ('map_topic', 'nav_msgs/OccupancyGrid', 'in', 'what the scan sees, `scan: map`'),
+    ('map_topic', 'nav_msgs/OccupancyGrid', 'in', 'map of which the scan is made, `scan: map`'),
 )
 _FIXED = (
     ('tf', 'tf2_msgs/TFMessage', 'out',

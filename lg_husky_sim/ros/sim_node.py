@@ -71,7 +71,7 @@ def _run(args: Sequence[str] | None) -> int:
         print(f'error: {error}', file=sys.stderr)
         return 1
     if foreign := api.own_arguments(words[1:]):
-        print(f'error: unknown argument {foreign[0]!r}: parameters go behind --ros-args -p, such '
+        print(f'error: unknown argument {foreign[0]!r}: parameters go after --ros-args -p, such '
               'as --ros-args -p rate:=100.0 (see sim_node -h)', file=sys.stderr)
         return 1
     node: Any = None

@@ -126,7 +126,7 @@ class Tool:
         while self.simulated and self.now() == 0.0:
             self.serve()
             if time.monotonic() > end:
-                raise CommandError(f'use_sim_time is set and nothing came on /clock for '
+                raise CommandError(f'use_sim_time is set and nothing was received on /clock for '
                                    f'{seconds:g} s')
 
     def serve(self) -> None:

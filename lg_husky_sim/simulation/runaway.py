@@ -26,5 +26,5 @@ def refuse_runaway(steps: int) -> None:
         a scrub less than that of no speed, has no other end.
     """
     if steps < 0:
-        raise ParameterError(f'with these numbers the model runs away: it gets faster than '
+        raise ParameterError(f'with these parameters the model is unstable: it exceeds '
                              f'{RUNAWAY:g} m/s or rad/s')

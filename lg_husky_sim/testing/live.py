@@ -242,7 +242,7 @@ class LiveHusky:
         if not received:
             # Whoever fails here has nobody yet who would end it, and others would hear it.
             self.node.stop(signal.SIGTERM)
-            raise SettingsError(f'the node does not come up: {self.node.log()}')
+            raise SettingsError(f'the node did not start: {self.node.log()}')
 
 
 @contextmanager

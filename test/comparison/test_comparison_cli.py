@@ -236,7 +236,7 @@ def test_a_rival_may_end_early_and_be_called_like_a_model(bag: Path) -> None:
     counts = [result['samples'] for result in data['recordings'][0]['results'].values()]
     share = min(counts[1][channel] / number for channel, number in counts[0].items())
     assert 0.3 < share < 0.6
-    said = ('the errors of paper (rival) are over a part of the drive, down to '
+    said = ('the errors of paper (rival) cover only a part of the drive, as little as '
             f'{share:.0%} of the samples of the others')
     assert data['recordings'][0]['notes'] == [said]
     for name in ('compare.txt', 'index.html'):

@@ -218,7 +218,7 @@ def test_a_signal_ends_the_twin_with_its_errors(tmp_path: Path, number: signal.S
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         assert twin.stdout is not None
         try:
-            assert 'nothing heard yet' in twin.stdout.readline()
+            assert 'nothing received yet' in twin.stdout.readline()
             twin.send_signal(number)
             out, said = twin.communicate(timeout=10.0)
         finally:

@@ -139,7 +139,7 @@ HOSTILE: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (put('effects', [{'effect': 'slope', 'parameters': {'slope_x': 1e6}}]),
      'slope_x = 1e+06 N is above its upper bound 400'),
     (put('effects', [{'effect': 'slope', 'late': True}]),
-     'effect slope is late, but there is no onset'),
+     'effect slope begins at an onset, but the model has none'),
     (put('effects', [{'effect': 'slope', 'late': 'soon'}]),
      "effect 1: late = 'soon' is neither true nor false"),
 ]

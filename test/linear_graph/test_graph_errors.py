@@ -117,7 +117,7 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         r"branch 'L': the thermal domain has no T-type; use an A-type"),
     'thermal two-port': (
         lambda: TwoPort('k', Kind.TRANSFORMER, (E, 'a', 'ground'), (T, 'b', 'ground'), 'k'),
-        r"port 'k.2' is thermal: temperature times heat flow is no power"),
+        r"port 'k.2' is thermal: temperature times heat flow is not a power"),
     'branch to itself': (
         lambda: resistor('R', 'a', 'a'), r"branch 'R' starts and ends at node 'a'"),
     'open end': (
@@ -162,7 +162,7 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         r"law 'p\*z \+ q' uses q, which is neither one of its arguments z1 nor"),
     'algebraic loop': (
         build(source('V', 'a'), resistor('R', 'a', 'b'), DIODE, inductor('L', 'b')),
-        r'algebraic loop diode <- V\(diode\) <- diode: .*put a storage into the loop'),
+        r'algebraic loop diode <- V\(diode\) <- diode: .*put an energy storage into the loop'),
     'law of the wrong variable': (
         build(source('V', 'b'), DIODE, branch('L', Kind.T_TYPE, 'b', 'c'),
               Branch('lamp', Kind.D_TYPE, E, 'c', 'ground', form=Form.DAMPING,

@@ -123,7 +123,7 @@ def test_without_voltage_kinetic_energy_only_falls(changes: dict[str, float]) ->
                                          + found['current_right'] ** 2))
     coasting = energy[found['time'] > 1.01]
     assert coasting[0] > 1.0
-    # What is left is the energy that bristles of the friction give back when they relax.
+    # The remaining residual is the energy that bristles of the friction give back when they relax.
     assert np.diff(coasting).max() < 5e-4 * coasting[0]
     assert coasting[-1] < 0.2 * coasting[0]
 

@@ -57,7 +57,7 @@ def test_a_simulator_that_is_reset_leaves_log_times(
     for series in recording.streams.values():
         np.testing.assert_allclose(series.times, times - 0.1, atol=1e-9)
         assert np.all(np.diff(series.values[:, 0]) > 0.0)
-    assert 'imu: header time runs back by 29.9 s: log times taken for it' in _said(recording)
+    assert 'imu: header time goes backwards by 29.9 s: log times used instead' in _said(recording)
 
 
 def test_a_few_messages_that_come_late_are_no_reset(bag: Any, tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_an_offset_between_two_stamped_streams_is_not_shared_out(
     for name in ('command', 'imu'):
         assert _apart(recording, name) == pytest.approx(0.0, abs=1e-6)
     assert recording.start_ns == 1_700_000_001_000_000_000
-    assert 'imu runs on a clock of its own: shifted by -8.000 s' in _said(recording)
+    assert 'imu is on another clock: shifted by -8.000 s' in _said(recording)
 
 
 @pytest.mark.parametrize(('ahead', 'read'), [
@@ -154,7 +154,7 @@ def test_the_bad_clock_of_a_battery_costs_nothing_else(header: FloatArray, said:
     np.testing.assert_array_equal(times['voltage'], streams['voltage'].logged)
     assert len(notes) == 1
     assert notes[0].startswith(f'voltage: header {said}')
-    assert notes[0].endswith(': log times taken for it')
+    assert notes[0].endswith(': log times used instead')
 
 
 def test_header_stamps_of_a_battery_alone_are_held_against_log_times() -> None:
@@ -175,7 +175,7 @@ def test_a_battery_on_the_wall_clock_follows_slow_simulated_time(stamped: bool) 
     for name in MAIN:
         np.testing.assert_array_equal(times[name], streams[name].header)
     np.testing.assert_array_equal(times['voltage'], times['wheels'][::20])
-    assert ('voltage has no header stamps of use: log times shifted by 0.000 to -11.800 s onto '
+    assert ('voltage has no usable header stamps: log times shifted by 0.000 to -11.800 s onto '
             'the header clock') in notes
 
 
@@ -184,7 +184,7 @@ def test_a_stream_whose_stamps_stand_still_takes_log_times() -> None:
     times, notes = common_clock(streams)
     np.testing.assert_array_equal(times['imu'], streams['imu'].logged)
     np.testing.assert_array_equal(times['wheels'], streams['wheels'].header)
-    assert notes == ['imu: header stamps stand still: log times taken for it']
+    assert notes == ['imu: header stamps do not advance: log times used instead']
 
 
 @pytest.mark.parametrize('unstamped', [None, 'command'])
@@ -214,4 +214,5 @@ def test_a_simulator_that_pauses_while_commands_go_on_leaves_log_times() -> None
     streams['command'] = _stamps(TICKS, TICKS)
     times, notes = common_clock(streams)
     np.testing.assert_array_equal(times['wheels'], streams['wheels'].logged)
-    assert notes == ['header clock and log clock drift by 3.0 s: log times taken throughout']
+    assert notes == ['header clock and log clock drift apart by 3.0 s: log times used for all '
+                     'streams']

@@ -46,7 +46,7 @@ def test_a_cut_bag_is_read_up_to_its_last_whole_chunk(
     rates = read.streams['imu'].column('yaw_rate')
     np.testing.assert_array_equal(rates, np.arange(len(rates)))
     assert share - 0.35 < len(rates) / SAMPLES <= share + 0.1
-    assert read.notes[0] == 'bag.mcap was cut off: read up to its last whole chunk'
+    assert read.notes[0] == 'bag.mcap is truncated: read up to its last complete chunk'
     assert (cut / 'bag.mcap').read_bytes() == before
     np.testing.assert_array_equal(
         read_recording(cut / 'bag.mcap').streams['imu'].values, read.streams['imu'].values)

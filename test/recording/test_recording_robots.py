@@ -49,7 +49,7 @@ def test_of_two_robots_one_is_read(
     for name in ('command', 'wheels', 'pose'):
         np.testing.assert_array_equal(recording.stream(name).values[:, 0], value)
     taken, left = (first, 'b') if value == 1.0 else ('b', first)
-    assert (f'topics of several robots: those of /{taken} are read, not those of /{left}'
+    assert (f'there are topics of several robots: those of /{taken} are used, not those of /{left}'
             in ' '.join(recording.notes))
 
 
@@ -237,7 +237,8 @@ def test_joints_of_a_gripper_are_no_wheels(first: str, bag: Any, tmp_path: Path)
     recording = read_recording(bag.write(tmp_path / 'bag'))
     np.testing.assert_array_equal(recording.stream('wheels').values, [(3.0, 3.0)] * 20)
     assert recording.notes == (
-        f'wheels: joints not called wheels, or of no side, were passed over: {KNUCKLES[0]}, '
+        'wheels: joints that are not called wheels, or have no side, were ignored: '
+        f'{KNUCKLES[0]}, '
         f'{KNUCKLES[1]}',)
 
 

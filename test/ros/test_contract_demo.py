@@ -87,7 +87,7 @@ def test_the_picture_shows_both_odometries(tmp_path: Path) -> None:
 def test_a_driver_without_listener_says_so(probe: Probe) -> None:
     """Nobody listens: one line that names topic, type and what may be wrong."""
     settings = make_settings(command_topic='/nobody/cmd_vel')
-    with pytest.raises(CommandError, match=r'nobody listens to /nobody/cmd_vel \(Twist\)'):
+    with pytest.raises(CommandError, match=r'no node subscribes to /nobody/cmd_vel \(Twist\)'):
         drive(Tool('lg_husky_driver', Orderly()), SHORT, settings, wait=0.2)
 
 

@@ -184,7 +184,7 @@ def test_a_parameter_file_and_the_command_line(probe: Probe, start: Start, tmp_p
 
 
 MISTAKES = (
-    (['--', '--rate', '3'], "unknown argument '--rate': parameters go behind --ros-args -p"),
+    (['--', '--rate', '3'], "unknown argument '--rate': parameters go after --ros-args -p"),
     (['--', 'rate:=3'], "unknown argument 'rate:=3'"),
     (['--rate', '3'], "unknown ROS argument '--rate'"),
     (['-p', 'rate:=5000.0'], 'rate = 5000.0 is not allowed: from 1 to 1000 Hz'),

@@ -129,7 +129,7 @@ def test_a_recorder_is_no_robot_and_another_type_is_named(probe: Probe, tmp_path
         api.message_type('geometry_msgs/msg/Twist'), '/b/cmd_vel', print, 10)
     driver = Tool('lg_husky_driver', Orderly())
     try:
-        with pytest.raises(CommandError, match=r'nobody listens to /b/cmd_vel \(Twist\)'):
+        with pytest.raises(CommandError, match=r'no node subscribes to /b/cmd_vel \(Twist\)'):
             drive(driver, FAST, settings, wait=0.5)
     finally:
         driver.close()
@@ -166,7 +166,7 @@ def test_who_listens_is_known_by_name_before_anything_moves(
             one.wait(0.5, said.append)
             assert said == [f'/late/cmd_vel moves {name} (Twist); no limit in this preset']
         else:
-            with pytest.raises(CommandError, match='nobody listens to /late/cmd_vel'):
+            with pytest.raises(CommandError, match='no node subscribes to /late/cmd_vel'):
                 one.wait(0.5, said.append)
             assert said == []
     finally:
@@ -278,7 +278,7 @@ def test_playing_names_who_else_publishes(
                                          ('left', 'right'))}, make_settings(), say=said.append)
     finally:
         tool.close()
-    assert said[-1] == f'/joint_states is published by {name} as well: who listens gets both'
+    assert said[-1] == f'/joint_states is published by {name} as well: subscribers receive both'
 
 
 def test_an_unknown_parameter_of_a_tool_is_named(probe: Probe, tmp_path: Path) -> None:
@@ -302,7 +302,7 @@ def test_a_tool_without_a_robot_says_so(probe: Probe, tmp_path: Path) -> None:
                 '--seconds', '0.5')
     _, said = empty.communicate(timeout=120.0)
     assert empty.returncode == 1
-    assert 'error: nothing came on /nobody/husky_velocity_controller/cmd_vel, ' in said
+    assert 'error: nothing was received on /nobody/husky_velocity_controller/cmd_vel, ' in said
     assert not (tmp_path / 'bag').exists()
 
 
@@ -339,7 +339,7 @@ def test_best_effort_publishers_are_recorded_and_kill_9_loses_a_second_at_most(
     assert rates[-1] > sent - 1 - 60
     assert len(rates) > 60
     if storage == 'mcap':
-        assert read.notes[0] == 'bag.mcap was cut off: read up to its last whole chunk'
+        assert read.notes[0] == 'bag.mcap is truncated: read up to its last complete chunk'
 
 
 def test_a_recording_of_nothing_is_an_error(probe: Probe, tmp_path: Path) -> None:

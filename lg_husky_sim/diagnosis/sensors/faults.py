@@ -96,8 +96,9 @@ def _signs(known: Known) -> list[Fault]:
     made: list[Fault] = []
     if speed is not None and reversed_(speed):
         made.append(Fault(None, 'wheels', None, _beyond(speed.factor, 0.0, 0.0),
-                          'The wheels turn backwards where the pose moves ahead: both wheel rates '
-                          'have the wrong sign, or the pose has its x axis astern'))
+                          'The wheels turn backwards while the pose moves forward: both wheel '
+                          'rates '
+                          'have the wrong sign, or the x axis of the pose points backwards'))
     count = [reversed_(one) for one in (gyro, both, turn)]
     if gyro is not None and count[0] and (both is None or count[1] or not count[2]):
         made.append(_reversed_gyro(gyro, 1.0, 'the pose'))
@@ -109,7 +110,7 @@ def _signs(known: Known) -> list[Fault]:
         made.append(_reversed_gyro(both, both.factor.value, 'the wheels'))
     elif turn is not None and count[2] and not reversed_(speed):
         made.append(Fault(None, 'wheels', None, _beyond(turn.factor, 0.0, 0.0),
-                          'The robot turns to the left where its left wheels turn faster: the '
+                          'The robot turns to the left when its left wheels turn faster: the '
                           'wheels of the two sides are interchanged'))
     return made
 
@@ -223,4 +224,4 @@ def _pair(first: str, second: str, one: Relation) -> Fault:
                  _beyond(late, 0.0, setting('late_tolerance')),
                  f'The stamps of {WORDS[first]} are {late.value:.2f} s ({late.low:.2f} to '
                  f'{late.high:.2f}) later than those of {WORDS[second]}, further than a robot '
-                 'follows its wheels; which of them is at fault, a third stream would tell')
+                 'lags its wheels; a third stream would tell which of them is at fault')

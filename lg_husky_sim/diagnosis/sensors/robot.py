@@ -108,13 +108,14 @@ def impossible(fit: Fit, parameters: Parameters) -> tuple[Difference, ...]:
             certainty = max(certainty, abs(float(residual)))
         elif unknown.kind == 'effect' and numbers.entry(name).unit == 'kg' and (
                 numbers[name] > load):
-            said.append(f'{words} where {load:g} kg are the most that it carries')
+            said.append(f'{words} where it carries at most {load:g} kg')
             certainty = max(certainty, most)
     if not said:
         return ()
     return (Difference(
         'drivetrain', (), 'everywhere',
-        f'to follow it, the model would need numbers that no such robot has ({"; ".join(said)})',
+        'to follow it, the model would need parameters that no such robot has '
+        f'({"; ".join(said)})',
         certainty),)
 
 
