@@ -77,7 +77,7 @@ def _intervals(fit: Fit) -> list[tuple[Unknown, float, float]]:
     covariance = np.linalg.pinv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
     # A number that moves no reading has no information, of which a pseudo-inverse makes certainty.
     half = np.where(np.diag(normal) > 1e-12,
-                    1.96 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), math.inf)
+                    setting('two_sided') * np.sqrt(np.maximum(np.diag(covariance), 0.0)), math.inf)
     return [(unknown, place, wide) for unknown, place, wide in zip(
         fit.point.unknowns, fit.point.places.tolist(), half.tolist(), strict=True)
         if unknown.kind != 'log']
@@ -101,7 +101,7 @@ def without_undetermined(evidence: Evidence, fit: Fit) -> Point:
     """
     point = fit.point
     idle = {p.name: neutral_of(p) for e in point.structure.effects for p in e.parameters()}
-    most = evidence.cost(evidence.residuals(fit.predicted), point) + 0.5 * 1.96 ** 2
+    most = evidence.cost(evidence.residuals(fit.predicted), point) + 0.5 * setting('two_sided') ** 2
     for name in undetermined(fit, list(point.numbers)):
         place = next(k for k, u in enumerate(point.unknowns) if u.name == name)
         unknown, value = point.unknowns[place], idle.get(name)

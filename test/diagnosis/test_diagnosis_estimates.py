@@ -7,16 +7,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import cast
 
 from lg_husky_sim.diagnosis.conclusion import estimates, undetermined, without_undetermined
 from lg_husky_sim.diagnosis.diagnose import model_of
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
-from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit, Point
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, Hypothesis
 from lg_husky_sim.diagnosis.wording import sentence
+from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
@@ -84,6 +86,39 @@ def test_a_number_that_cannot_be_without_its_value_keeps_it(limited: tuple[Evide
     point = without_undetermined(evidence, blind)
     assert point.values['limit_yaw'] == fit.point.values['limit_yaw']
     assert point.values['limit_forward'] > BEYOND
+
+
+def test_a_number_without_which_there_is_no_model_stays_as_it_was_fitted(
+        limited: tuple[Evidence, Fit]) -> None:
+    """Its neutral value may be one at which nothing can be simulated."""
+    evidence, fit = limited
+    tried = []
+
+    class Refusing:
+        def __getattr__(self, name: str) -> object:
+            return getattr(evidence, name)
+
+        def predict(self, point: Point) -> object:
+            tried.append(point.values['limit_forward'])
+            raise FitError('no such model')
+    point = without_undetermined(cast('Evidence', Refusing()), fit)
+    value, = tried
+    assert value > BEYOND
+    assert point.values['limit_forward'] == fit.point.values['limit_forward']
+    assert point is fit.point
+
+
+def test_other_errors_than_ours_are_not_hidden(limited: tuple[Evidence, Fit]) -> None:
+    evidence, fit = limited
+
+    class Broken:
+        def __getattr__(self, name: str) -> object:
+            return getattr(evidence, name)
+
+        def predict(self, point: Point) -> object:
+            raise ZeroDivisionError
+    with pytest.raises(ZeroDivisionError):
+        without_undetermined(cast('Evidence', Broken()), fit)
 
 
 def test_a_finding_without_a_number_is_a_sentence() -> None:

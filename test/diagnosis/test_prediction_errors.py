@@ -62,7 +62,7 @@ def test_a_robot_like_the_model_needs_no_change(nominal_drives: list[Recording])
 def test_a_wrong_parameter_is_named_with_the_value_that_it_should_have(
         name: str, kind: str, factor: float) -> None:
     true = factor * NOMINAL.parameters[name]
-    found = assessed(drives(lg.Husky(**{name: true})))
+    found = assessed(drives(lg.Husky(None, **{name: true})))
     one = only(found)
     assert one.kind == kind
     assert one.value.value == pytest.approx(factor, rel=0.02)

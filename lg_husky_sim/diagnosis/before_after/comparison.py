@@ -19,9 +19,6 @@ from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
 
-#: Ways to part recordings above which they are drawn and not listed.
-_ENUMERATED = 2000
-
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -111,7 +108,7 @@ def compare(fits: RecordingFits, later: Collection[str]) -> Block:
     all_of_it[comparison.everything] = every.shift
     gains, wholes = [], []
     for way in partitions([q.recording for q in fits.quadratics], later,
-                          int(numbers['partitions'])):
+                          int(numbers['partitions']), int(numbers['partitions_listed'])):
         gains.append(comparison.candidates(comparison.evidence(
             comparison.without(best, later), way))[0].gain)
         other = comparison.evidence(comparison.without(all_of_it, later), way)
@@ -127,7 +124,8 @@ def compare(fits: RecordingFits, later: Collection[str]) -> Block:
               for one in candidates), anything, exchange_chance(anything, wholes, numbers))
 
 
-def partitions(names: Sequence[str], later: Collection[str], most: int) -> list[frozenset[str]]:
+def partitions(names: Sequence[str], later: Collection[str], most: int, listed: int
+               ) -> list[frozenset[str]]:
     """
     Return the other ways to part recordings into two sets of the same sizes.
 
@@ -139,6 +137,8 @@ def partitions(names: Sequence[str], later: Collection[str], most: int) -> list[
         One set as it is.
     most : int
         Ways at most; where there are more, they are drawn.
+    listed : int
+        Choices of a set up to which all are listed before that.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def partitions(names: Sequence[str], later: Collection[str], most: int) -> list[
     """
     names, given, size = sorted(names), frozenset(later), len(later)
     halves = 2 * size == len(names)
-    if math.comb(len(names), size) > 2 * _ENUMERATED:
+    if math.comb(len(names), size) > listed:
         rng = np.random.default_rng(len(names))
         drawn = (rng.permutation(len(names))[:size] for _ in range(20 * most))
     else:

@@ -22,8 +22,6 @@ CHANNELS = {'wheels': ('left', 'right'), 'imu': ('yaw', 'accel_x', 'accel_y'),
 #: Their kinds in ``config/before_after.yaml``.
 KINDS = {'left': 'wheels', 'right': 'wheels', 'yaw': 'yaw', 'accel_x': 'accel',
          'accel_y': 'accel', 'ahead': 'place', 'aside': 'place', 'turn': 'heading'}
-#: A prediction beyond this, in any unit, is that of a simulation which has broken down.
-_BROKEN = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,7 +288,8 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
         else:
             path = moved(base, drive, changed, inputs) if k < len(ROBOT) else motion
         other = predicted(base, drive, changed, path)
-        if all(np.all(np.abs(rows) < _BROKEN) for rows in other.values()):
+        diverged = base.settings.simulation['diverged']
+        if all(np.all(np.abs(rows) < diverged) for rows in other.values()):
             for name, rows in other.items():
                 columns[name][:, :, k] = (should[name] - rows) / delta
     return {name: there[name] - should[name] for name in should}, columns

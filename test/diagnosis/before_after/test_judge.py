@@ -88,12 +88,19 @@ def test_which_set_came_first_and_the_order_of_recordings_do_not_matter() -> Non
     ('abcdef', 'def', 9), ('abcd', 'cd', 2), ('ab', 'b', 0), ('abcd', 'd', 3),
     ('abcde', 'de', 9), ('abcdefghijklmnop', 'ijklmnop', 30)])
 def test_all_other_ways_to_part_recordings_are_tried(names: str, later: str, count: int) -> None:
-    ways = partitions(names, frozenset(later), 30)
-    assert ways == partitions(names[::-1], frozenset(later), 30)
+    ways = partitions(names, frozenset(later), 30, 4000)
+    assert ways == partitions(names[::-1], frozenset(later), 30, 4000)
     assert len({frozenset([way, frozenset(names) - way]) for way in ways}) == count == len(ways)
     assert all(len(way) == len(later) or 2 * len(later) == len(names) for way in ways)
     assert frozenset(later) not in ways
     assert 2 * len(later) != len(names) or frozenset(names) - frozenset(later) not in ways
+
+
+def test_ways_beyond_those_that_are_listed_are_drawn_without_repetition() -> None:
+    drawn = partitions('abcdefgh', frozenset('efgh'), 20, 10)
+    assert drawn != partitions('abcdefgh', frozenset('efgh'), 20, 4000)
+    assert len({frozenset([way, frozenset('abcdefgh') - way]) for way in drawn}) == 20
+    assert all(len(way) == 4 for way in drawn)
 
 
 def test_a_gain_is_rare_where_it_is_far_above_those_of_other_partitions() -> None:
