@@ -101,7 +101,8 @@ def without_undetermined(evidence: Evidence, fit: Fit) -> Point:
     """
     point = fit.point
     idle = {p.name: neutral_of(p) for e in point.structure.effects for p in e.parameters()}
-    most = evidence.cost(evidence.residuals(fit.predicted), point) + 0.5 * setting('two_sided') ** 2
+    room = 0.5 * setting('two_sided') ** 2
+    most = evidence.cost(evidence.residuals(fit.predicted), point) + room
     for name in undetermined(fit, list(point.numbers)):
         place = next(k for k, u in enumerate(point.unknowns) if u.name == name)
         unknown, value = point.unknowns[place], idle.get(name)
