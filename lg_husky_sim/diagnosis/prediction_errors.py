@@ -195,7 +195,7 @@ def assess(parts: Predicted, label: str, parameters: Parameters) -> Assessment:
     poor = [name for name, fit in everything.items()
             if fit.explained < setting('least_explained')]
     found += [_error('unexplained', Number(max(0.0, everything[name].explained), math.nan,
-                                            math.nan), name) for name in poor]
+                                           math.nan), name) for name in poor]
     sound = {name: fit for name, fit in everything.items() if name not in poor}
     # A limit shifts edges: what it cuts off has no delay of its own.
     found += [*_delays({name: fit for name, fit in sound.items() if not (
