@@ -4,16 +4,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+import math
 import random
+from typing import Any
 
 from lg_husky_sim.errors import MissingExtraError
 from lg_husky_sim.identification.paper import paper
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from numpy.typing import NDArray
 
 Objective = Callable[[FloatArray], FloatArray]
 #: Called after each generation with its number and the best cost so far.
@@ -52,6 +53,11 @@ class SearchResult:
     message: str
 
 
+class _Candidate(list[float]):
+    # Genes, with the fitness by which DEAP compares them: minus the cost.
+    fitness = -math.inf
+
+
 @contextmanager
 def _seeded(seed: int) -> Iterator[None]:
     # DEAP draws from the module random: its state is ours only while the search runs.
@@ -70,10 +76,10 @@ def genetic(objective: Objective, lower: FloatArray, upper: FloatArray, seed: in
     """
     Search as the paper does: a genetic algorithm as MATLAB's ``ga`` runs it.
 
-    Of each generation 5 % survive unchanged; of the rest, the crossover fraction are children
-    of two parents by scattered crossover and the others Gaussian mutants of one, whose spread
-    shrinks linearly to zero. Parents are the winners of tournaments of two, which in
-    expectation is linear ranking.
+    The best candidates so far make up 5 % of each generation; of the rest, the crossover
+    fraction are children of two parents by scattered crossover and the others Gaussian mutants
+    of one, whose standard deviation shrinks linearly to zero. Parents are the winners of
+    tournaments of two, which in expectation is linear ranking. All of these are DEAP's operators.
 
     Parameters
     ----------
@@ -104,49 +110,62 @@ def genetic(objective: Objective, lower: FloatArray, upper: FloatArray, seed: in
                                 "installed: pip install 'lg_husky_sim[search]'") from error
     size = population or paper().population
     count = generations or paper().generations
-    share = paper().crossover_fraction if crossover_fraction is None else crossover_fraction
+    fraction = paper().crossover_fraction if crossover_fraction is None else crossover_fraction
     elite = max(1, round(ELITE * size))
-    crossed = round(share * (size - elite))
-    span = upper - lower
-    draws = np.random.default_rng(seed)
+    crossed = round(fraction * (size - elite))
+    box = _toolbox(objective, lower, upper)
+    best_so_far, logbook = tools.HallOfFame(elite), tools.Logbook()
+    costs = tools.Statistics(lambda candidate: -candidate.fitness)
+    costs.register('mean', _mean)
     with _seeded(seed):
-        genes = lower + span * draws.random((size, lower.size))
-        costs = objective(genes)
-        best, mean = [float(costs.min())], [_mean(costs)]
-        for generation in range(1, count + 1):
-            order = np.argsort(costs, kind='stable')
-            rank = np.empty(size, dtype=np.int64)
-            rank[order] = np.arange(size)
-            parents = np.minimum(*_tournaments(rank, crossed * 2 + size - elite - crossed, draws))
-            chosen = genes[order[parents]].tolist()
-            children = []
-            for place in range(crossed):
-                first, _ = tools.cxUniform(chosen[2 * place], chosen[2 * place + 1], 0.5)
-                children.append(first)
-            spread = (span * (1.0 - generation / count)).tolist()
-            still = [0.0] * lower.size
-            for parent in chosen[2 * crossed:]:
-                children.append(tools.mutGaussian(parent, still, spread, 1.0)[0])
-            new = np.clip(np.array(children).reshape(-1, lower.size), lower, upper)
-            genes = np.vstack([genes[order[:elite]], new])
-            costs = np.concatenate([costs[order[:elite]], objective(new)])
-            best.append(float(costs.min()))
-            mean.append(_mean(costs))
-            if progress is not None:
-                progress(generation, best[-1])
-    winner = int(np.argmin(costs))
-    return SearchResult(genes[winner], float(costs[winner]), np.array(best), np.array(mean),
+        generation = box.evaluate(tools.initRepeat(list, box.draw, size))
+        for number in range(count + 1):
+            if number:
+                parents = list(map(box.clone, box.select(generation, size - elite + crossed)))
+                couples, others = parents[:2 * crossed], parents[2 * crossed:]
+                for first, second in zip(couples[::2], couples[1::2], strict=True):
+                    box.mate(first, second)
+                spread = ((upper - lower) * (1.0 - number / count)).tolist()
+                for parent in others:
+                    box.mutate(parent, sigma=spread)
+                generation = [*best_so_far, *box.evaluate([*couples[::2], *others])]
+            best_so_far.update(generation)
+            logbook.record(best=-best_so_far[0].fitness, **costs.compile(generation))
+            if number and progress is not None:
+                progress(number, logbook[-1]['best'])
+    best, mean = map(np.array, logbook.select('best', 'mean'))
+    return SearchResult(np.array(best_so_far[0]), float(best[-1]), best, mean,
                         size + count * (size - elite), True, f'{count} generations')
 
 
-def _tournaments(rank: NDArray[np.int64], count: int, draws: np.random.Generator
-                 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    rivals = draws.integers(0, rank.size, (2, count))
-    return rank[rivals[0]], rank[rivals[1]]
+def _toolbox(objective: Objective, lower: FloatArray, upper: FloatArray) -> Any:
+    # DEAP's operators; a generation is put between the bounds and evaluated at once.
+    from deap import base, tools
+
+    def draw() -> _Candidate:
+        return _Candidate(map(random.uniform, lower.tolist(), upper.tolist()))
+
+    def evaluate(candidates: Sequence[_Candidate]) -> Sequence[_Candidate]:
+        genes = np.clip(np.array(candidates), lower, upper)  # mutants may lie outside
+        for one, row, value in zip(candidates, genes.tolist(), objective(genes).tolist(),
+                                   strict=True):
+            one[:] = row
+            one.fitness = -value
+        return candidates
+
+    box = base.Toolbox()
+    box.register('draw', draw)
+    box.register('clone', _Candidate)
+    box.register('evaluate', evaluate)
+    box.register('select', tools.selTournament, tournsize=2)
+    box.register('mate', tools.cxUniform, indpb=0.5)
+    box.register('mutate', tools.mutGaussian, mu=[0.0] * lower.size, indpb=1.0)
+    return box
 
 
-def _mean(costs: FloatArray) -> float:
-    finite = costs[np.isfinite(costs)]
+def _mean(costs: Iterable[float]) -> float:
+    values = np.asarray(costs, dtype=np.float64)
+    finite = values[np.isfinite(values)]
     return float(finite.mean()) if finite.size else float('inf')
 
 

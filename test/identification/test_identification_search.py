@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import random
+from typing import Any
 
 from lg_husky_sim.identification.paper import paper
 from lg_husky_sim.identification.search import (
@@ -50,6 +51,46 @@ def test_the_genetic_algorithm_counts_as_the_paper_says() -> None:
     assert found.best.shape == found.mean.shape == (101,)
     assert np.all(np.diff(found.best) <= 0.0)
     assert found.mean[-1] < found.mean[0]
+
+
+def test_a_generation_is_made_by_deaps_operators_in_the_papers_shares(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 100, 5 stay, 48 are children of two parents and 47 mutants of one."""
+    from deap import tools
+
+    select, mate, mutate = tools.selTournament, tools.cxUniform, tools.mutGaussian
+    selected, mated, spreads = [], [], []
+
+    def selecting(candidates: Any, count: int, **options: Any) -> Any:
+        selected.append(count)
+        return select(candidates, count, **options)
+
+    def mating(*couple: Any, **options: Any) -> Any:
+        mated.append(couple)
+        return mate(*couple, **options)
+
+    def mutating(candidate: Any, sigma: list[float], **options: Any) -> Any:
+        spreads.append(sigma[0] / float(HIGH[0] - LOW[0]))
+        return mutate(candidate, sigma=sigma, **options)
+    monkeypatch.setattr(tools, 'selTournament', selecting)
+    monkeypatch.setattr(tools, 'cxUniform', mating)
+    monkeypatch.setattr(tools, 'mutGaussian', mutating)
+    genetic(bowl, LOW, HIGH, 0, generations=10)
+    assert selected == [2 * 48 + 47] * 10
+    assert len(mated) == 480
+    assert spreads == pytest.approx(np.repeat(np.linspace(0.9, 0.0, 10), 47))
+
+
+def test_the_best_candidates_survive_unchanged() -> None:
+    seen: list[FloatArray] = []
+
+    def keeping(rows: FloatArray) -> FloatArray:
+        seen.append(rows.copy())
+        return bowl(rows)
+    found = genetic(keeping, LOW, HIGH, 6, generations=5)
+    everything = np.vstack(seen)
+    assert found.cost == bowl(everything).min() == found.best[-1]
+    np.testing.assert_array_equal(found.values, everything[np.argmin(bowl(everything))])
 
 
 @pytest.mark.parametrize('search', [genetic, differential_evolution])
