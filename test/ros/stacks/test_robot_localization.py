@@ -5,12 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
-from importlib.util import find_spec
 import math
-import os
 from pathlib import Path
-import subprocess
 import sys
 from typing import Any
 
@@ -41,19 +37,6 @@ CONFIG = """\
 """
 
 
-def ekf_node() -> Path | None:
-    """Return the filter's program, or None where it is not installed."""
-    if find_spec('rclpy') is None or find_spec('ament_index_python') is None or (
-            not os.environ.get('AMENT_PREFIX_PATH')):
-        return None
-    packages = import_module('ament_index_python.packages')
-    try:
-        prefix = packages.get_package_prefix('robot_localization')
-    except packages.PackageNotFoundError:
-        return None
-    return Path(prefix) / 'lib' / 'robot_localization' / 'ekf_node'
-
-
 def place(message: Any) -> tuple[int, float, float]:
     """Return stamp [ns] and position of an Odometry."""
     stamp = int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec)
@@ -62,14 +45,12 @@ def place(message: Any) -> tuple[int, float, float]:
 
 
 @pytest.mark.realtime
-@pytest.mark.skipif(ekf_node() is None, reason='robot_localization is not installed: '
-                    'what is claimed of it on this page is not tested here')
 @pytest.mark.parametrize('manoeuvre', ['circle', 's_bend', 'obstacle'])
 def test_the_filter_agrees_with_the_truth(
-        probe: Probe, start: Callable[..., LiveHusky], tmp_path: Path, manoeuvre: str) -> None:
+        probe: Probe, start: Callable[..., LiveHusky], run: Callable[..., Any],
+        program: Callable[[str, str], Path], tmp_path: Path, manoeuvre: str) -> None:
     """Vx of the wheels with heading and yaw rate of the IMU: within 3 % of the way, all along."""
-    program = ekf_node()
-    assert program is not None
+    ekf_node = program('robot_localization', 'ekf_node')
     (tmp_path / 'ekf.yaml').write_text(CONFIG, encoding='utf-8')
     truth = probe.listen('nav_msgs/msg/Odometry', '/ground_truth', 200)
     filtered = probe.listen('nav_msgs/msg/Odometry', '/odometry/filtered', 200)
@@ -83,21 +64,14 @@ def test_the_filter_agrees_with_the_truth(
     static.publish(transforms(transforms=[mounted]))
     husky = start(preset='husky_ros1', publish_clock=True, speed=SPEED)
     husky.ready(truth)
-    children = [subprocess.Popen([program, '--ros-args', '--params-file', tmp_path / 'ekf.yaml'],
-                                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)]
-    try:
-        assert probe.until(lambda: len(filtered) > 20, 30.0)
-        children.append(subprocess.Popen(
-            [sys.executable, '-m', 'lg_husky_sim.cli.main', 'drive', manoeuvre, '--preset',
-             'husky_ros1', '--namespace', '/', '--ros-args', '-p', 'use_sim_time:=true'],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=dict(os.environ)))
-        assert probe.until(lambda: children[1].poll() is not None, 240.0)
-        assert children[1].returncode == 0
-        probe.spin(1.0)
-    finally:
-        for child in children:
-            child.terminate()
-            child.wait()
+    run(ekf_node, '--ros-args', '--params-file', tmp_path / 'ekf.yaml')
+    assert probe.until(lambda: len(filtered) > 20, 30.0)
+    drive = run(Path(sys.executable), '-m', 'lg_husky_sim.cli.main', 'drive', manoeuvre,
+                '--preset', 'husky_ros1', '--namespace', '/', '--ros-args', '-p',
+                'use_sim_time:=true')
+    assert probe.until(lambda: drive.poll() is not None, 240.0)
+    assert drive.returncode == 0
+    probe.spin(1.0)
     true = {stamp: (x, y) for stamp, x, y in map(place, truth)}
     way = sum(math.dist(a, b) for a, b in zip(
         list(true.values())[:-1], list(true.values())[1:], strict=True))

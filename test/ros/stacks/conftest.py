@@ -1,0 +1,62 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Programs of other ROS packages, unmodified, beside the node; without a package, a loud skip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from importlib.util import find_spec
+import os
+from pathlib import Path
+import signal
+import subprocess
+
+import pytest
+
+
+def find_program(package: str, name: str) -> Path:
+    """Return a program of a ROS package; skip the test where it is not installed."""
+    reason = f'{package} is not installed: what is claimed of it is not tested here'
+    if find_spec('rclpy') is None or find_spec('ament_index_python') is None or (
+            not os.environ.get('AMENT_PREFIX_PATH')):
+        pytest.skip(reason)
+    packages = import_module('ament_index_python.packages')
+    try:
+        prefix = packages.get_package_prefix(package)
+    except packages.PackageNotFoundError:
+        pytest.skip(reason)
+    return Path(prefix) / 'lib' / package / name
+
+
+@pytest.fixture
+def program() -> Callable[[str, str], Path]:
+    """Return the finder of programs, as fixtures are all that tests get from here."""
+    return find_program
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
+    """Return a starter of programs that are ended with the test; what they said is printed."""
+    running: list[tuple[subprocess.Popen[bytes], Path]] = []
+
+    def start(path: Path, *words: str | Path, **options: int) -> subprocess.Popen[bytes]:
+        log = tmp_path / f'{len(running)}_{path.name}.log'
+        with log.open('wb') as file:
+            running.append((subprocess.Popen(
+                [path, *words], start_new_session=True,
+                **{'stdout': file, 'stderr': file, **options}), log))
+        return running[-1][0]
+
+    yield start
+    for process, _ in reversed(running):
+        if process.poll() is None:
+            # To its children as well, as Ctrl-C in a terminal; `launch` leaves them to that.
+            os.killpg(process.pid, signal.SIGINT)
+    for process, log in running:
+        try:
+            process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        print(f'--- {log.name}\n{log.read_text(errors="replace")[-4000:]}')
