@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 import signal
 import subprocess
+from typing import Any
 
 import pytest
 
@@ -40,12 +41,12 @@ def run(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
     """Return a starter of programs that are ended with the test; what they said is printed."""
     running: list[tuple[subprocess.Popen[bytes], Path]] = []
 
-    def start(path: Path, *words: str | Path, **options: int) -> subprocess.Popen[bytes]:
+    def start(path: Path, *words: str | Path, **options: Any) -> subprocess.Popen[bytes]:
         log = tmp_path / f'{len(running)}_{path.name}.log'
         with log.open('wb') as file:
             running.append((subprocess.Popen(
-                [path, *words], start_new_session=True,
-                **{'stdout': file, 'stderr': file, **options}), log))
+                [path, *words], stdout=file, stderr=file, start_new_session=True,
+                **options), log))
         return running[-1][0]
 
     yield start

@@ -142,7 +142,8 @@ def test_all_that_the_rviz_layout_shows_is_published(
         topic = display.get('Topic') or display.get('Description Topic')
         if topic:
             assert offered[f'/{topic["Value"]}'] == [classes[display['Class']]]
-            assert probe.node.count_publishers(f'/{topic["Value"]}') == 1
+            node: Any = probe.node
+            assert node.count_publishers(f'/{topic["Value"]}') == 1
             shown += 1
     assert shown >= 3
     frame = manager['Global Options']['Fixed Frame']

@@ -43,12 +43,16 @@ def test_keys_drive_the_robot_and_a_key_let_go_stops_it(
                     os.write(terminal, key)
                 probe.spin(0.04)
                 twist = odometry[-1].twist.twist
-                return abs(twist.linear.x - speed) < NEAR and abs(twist.angular.z - yaw) < NEAR
+                return bool(abs(twist.linear.x - speed) < NEAR
+                            and abs(twist.angular.z - yaw) < NEAR)
             return probe.until(there, PATIENCE)
 
         # Until it is ready, it is only a terminal.
-        assert probe.until(lambda: os.write(terminal, b'k') and probe.spin(0.1) is None
-                           and commands, 20.0)
+        def heard() -> bool:
+            os.write(terminal, b'k')
+            probe.spin(0.1)
+            return bool(commands)
+        assert probe.until(heard, 20.0)
         assert reached(SPEED, 0.0, b'i')
         assert reached(-SPEED, 0.0, b',')
         assert reached(0.0, TURN, b'j')
