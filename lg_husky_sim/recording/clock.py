@@ -94,7 +94,7 @@ def common_clock(streams: Mapping[str, Stamps]) -> tuple[dict[str, IntArray], li
                               for name, delay in delays.items() if _is_main(name))))
     if drift > SKEW_NS:
         notes.append(f'header clock and log clock drift apart by {drift * 1e-9:.1f} s: '
-                     'log times taken throughout')
+                     'log times used for all streams')
         times = {name: stamps.logged for name, stamps in streams.items()}
     else:
         notes += [f'{name}: header clock drifts by {apart * 1e-9:.1f} s: log times used instead'
@@ -139,7 +139,7 @@ def _headers(streams: Mapping[str, Stamps], notes: list[str]) -> dict[str, IntAr
         back = _step_back(stamps.logged, mended)
         if back:
             notes.append(f'{name}: header time goes backwards by {back * 1e-9:.1f} s: '
-                         'log times taken for it')
+                         'log times used instead')
         else:
             headers[name] = mended
     return headers

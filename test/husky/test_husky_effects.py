@@ -368,7 +368,7 @@ def test_a_belt_needs_the_expanded_drivetrain() -> None:
 def test_late_effects_need_an_onset_and_may_not_add_states(robot: Maker) -> None:
     with pytest.raises(ParameterError, match='payload begins at an onset, but the model has none'):
         robot(Effect('payload', late=True))
-    with pytest.raises(ParameterError, match='late effect may not add states'):
+    with pytest.raises(ParameterError, match='effect with an onset may not add states'):
         robot(Effect('speed_loop', late=True), onset=Onset(OnsetKind.TIME, 1.0))
 
 

@@ -119,7 +119,7 @@ def test_a_model_that_is_not_proper_goes_only_where_it_fits(tmp_path: Path) -> N
 
 def test_laws_that_are_not_linear_are_named_where_they_are_left_out(tmp_path: Path) -> None:
     husky = lg.Husky().with_effect('coulomb_drivetrain', side='left')
-    assert 'not linear are left out' in husky.export(tmp_path / 'one.h').read_text('utf-8')
+    assert 'Non-linear laws are left out' in husky.export(tmp_path / 'one.h').read_text('utf-8')
     assert 'G' in json.loads(husky.export(tmp_path / 'one.json').read_text('utf-8'))
     assert {'G', 'H'} <= set(used_matrices(husky.numeric()))
 

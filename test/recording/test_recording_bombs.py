@@ -115,7 +115,7 @@ def test_chunks_that_overlap_are_counted_together(tmp_path: Path) -> None:
     backwards = b''.join(index(9, 0) for _ in range(5))
     assert refusal(mcap(path, whole, topics + backwards + statistics)).startswith('chunks that')
     later = b''.join(index(10 * k, 10 * k + 9) for k in range(5))
-    with pytest.raises(RecordingError, match='no message of use'):
+    with pytest.raises(RecordingError, match='no usable messages'):
         read_recording(mcap(path, whole, topics + later + statistics))
 
 

@@ -252,7 +252,7 @@ def test_joints_that_might_be_wheels_are_noted(
 ) -> None:
     bag.joints(1.0, (*FRONT_REAR, *further), [1.0] * (4 + len(further)))
     notes = ' '.join(read_recording(bag.write(tmp_path / 'bag')).notes)
-    assert notes.partition('passed over: ')[2] == said
+    assert notes.partition('ignored: ')[2] == said
 
 
 @pytest.mark.parametrize('velocities', [True, False])
