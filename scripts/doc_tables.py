@@ -67,9 +67,26 @@ def manoeuvres() -> str:
         for one in builtin_manoeuvres().values()))
 
 
+def rooms() -> str:
+    """Return the packages of the diagnosis: purpose, modules, rounded lines."""
+    import ast
+
+    import lg_husky_sim.diagnosis
+    root = Path(lg_husky_sim.diagnosis.__file__).parent
+    rows = []
+    for place in (*sorted(path.parent for path in root.glob('*/__init__.py')), root):
+        modules = [path for path in place.glob('*.py') if path.name != '__init__.py']
+        about = ast.get_docstring(ast.parse((place / '__init__.py').read_text('utf-8'))) or ''
+        lines = sum(len(path.read_text('utf-8').splitlines()) for path in modules)
+        rows.append((f'`{place.relative_to(root.parent)}`', about.partition('\n')[0],
+                     len(modules), round(lines, -2)))
+    return table(('package', 'question', 'modules', 'lines'), rows)
+
+
 TABLES: Mapping[str, tuple[str, Callable[[], str]]] = {
     'verbs': ('command_line.md', verbs), 'effects': ('catalogue.md', effects),
-    'parameters': ('catalogue.md', parameters), 'manoeuvres': ('catalogue.md', manoeuvres)}
+    'parameters': ('catalogue.md', parameters), 'manoeuvres': ('catalogue.md', manoeuvres),
+    'rooms': ('diagnosis.md', rooms)}
 
 
 def filled(page: str, text: str) -> str:

@@ -103,7 +103,7 @@ def test_text_and_picture_of_the_real_diagnosis_give_the_same_figures(
 
 
 def test_the_table_of_the_real_diagnosis_is_that_of_its_picture() -> None:
-    page = passage(DOCS / 'real_recordings.md', '| root mean square error, second', 'There the')
+    page = passage(DOCS / 'real_recordings.md', '| root mean square error, second', 'Here the')
     rows = re.findall(r'^\| .+? \| \**([\d.]+)\** \| \**([\d.]+)\** \|$', page, re.MULTILINE)
     assert len(rows) == 5
     held = re.findall(r'^Held-out data, .+ recalibrated ([\d.]+), with finding ([\d.]+)$',

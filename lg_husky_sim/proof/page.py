@@ -23,7 +23,8 @@ edited by hand. All of them are recomputed, in seconds, by
 A generator that shares no code with the diagnosis injects effects into a robot, drives it, and
 writes rosbags ([how](proof_generator.md)). The answers are sealed: the SHA-256 of each salted
 answer is recorded before the first diagnosis. Then `lg_husky diagnose` is called as any user would
-call it, with the recordings and the dimensions of the robot.
+call it, with the recordings and the dimensions of the robot. What the diagnosis does, and how its
+code is arranged, stands [on its page](diagnosis.md#where-it-is-in-the-code).
 
 Conditions that differ from log to log are drawn over orders of magnitude: roughness of the floor,
 noise, ticks, how wheel speeds are computed, stamps, jitter, rates, the base's own clock, lost and

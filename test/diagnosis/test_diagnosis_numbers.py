@@ -18,18 +18,24 @@ import yaml
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'lg_husky_sim'
 DIAGNOSIS = {path.relative_to(PACKAGE / 'diagnosis').as_posix(): path.read_text()
-             for path in sorted((PACKAGE / 'diagnosis').rglob('*.py'))
-             if 'before_after' not in path.parts}
+             for path in sorted((PACKAGE / 'diagnosis').rglob('*.py'))}
 CODE = '\n'.join(path.read_text() for path in sorted(PACKAGE.rglob('*.py')))
 SETTINGS: dict[str, Any] = yaml.safe_load((ROOT / 'config' / 'diagnosis.yaml').read_text())
 ENTRIES = {name: entry for section, entries in SETTINGS.items() if section != 'schema'
            for name, entry in entries.items()}
 #: Sizes of arrays, layouts and identities: no physics and no statistics.
 LAYOUT = {'STATES', 'BALANCES', 'NEUTRAL', 'LEAST_CHANCE', 'TOGETHER'}
-#: Who may name an effect, and which: a wording.
+#: Who may name an effect, and which: a wording; the base robot, whose parameters have such names;
+#: and that base as a model of the library, which is made of effects.
 NAMED = {
     'conclusion.py': {'yaw_pull'},
     'wording.py': {'sensor_time_offset'},
+    'before_after/base_robot.py': {'current_limit'},
+    'before_after/conclusion.py': {'gyro_sign'},
+    'before_after/prediction.py': {'gyro_bias'},
+    'before_after/runnable.py': {'command_latency', 'command_slew', 'coulomb_drivetrain',
+                                 'current_limit', 'slope', 'speed_loop', 'traction_saturation',
+                                 'wheel_radius_mismatch'},
 }
 
 

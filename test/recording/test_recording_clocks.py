@@ -144,8 +144,8 @@ def test_without_log_times_small_offsets_are_no_clocks(bag: Any, tmp_path: Path)
 
 
 @pytest.mark.parametrize(('header', 'said'), [
-    (np.full(60, 3.0), 'stamps do not advance'), (np.minimum(SECONDS, 20.0), 'clock drifts by 32.'),
-    (1.1 * SECONDS, 'clock drifts by 4.5 s')])
+    (np.full(60, 3.0), 'stamps do not advance'),
+    (np.minimum(SECONDS, 20.0), 'clock drifts by 32.'), (1.1 * SECONDS, 'clock drifts by 4.5 s')])
 def test_the_bad_clock_of_a_battery_costs_nothing_else(header: FloatArray, said: str) -> None:
     streams = {**_jittered(), 'voltage': _stamps(SECONDS, header)}
     times, notes = common_clock(streams)
