@@ -162,6 +162,8 @@ class EffectKind:
     onset : str
         ``required`` where it only makes sense with one, ``never`` where it is always on, since
         it adds states; else empty.
+    always : tuple of str
+        Forms that are always on, since they add states.
     drivetrain : str
         The drivetrain that has it; empty for any.
     needs : mapping of str to str
@@ -184,6 +186,7 @@ class EffectKind:
     sides: tuple[str, ...] = ('none',)
     shapes: tuple[str, ...] = ('',)
     onset: str = ''
+    always: tuple[str, ...] = ()
     drivetrain: str = ''
     needs: Mapping[str, str] = field(default_factory=dict)
     stands_for: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -199,7 +202,7 @@ class EffectKind:
 
     @property
     def always_on(self) -> bool:
-        """Whether it adds states, so that it cannot begin at an onset."""
+        """Whether all of its forms add states, so that none can begin at an onset."""
         return self.onset == 'never'
 
 
@@ -253,6 +256,11 @@ class Effect:
         """Entry of the catalogue."""
         return effect_kind(self.id)
 
+    @property
+    def always_on(self) -> bool:
+        """Whether it adds states, so that it cannot begin at an onset."""
+        return self.kind.always_on or self.shape in self.kind.always
+
     def parameters(self) -> tuple[EffectParameter, ...]:
         """Return the numbers that this side and shape have."""
         own = tuple(p for p in self.kind.parameters
@@ -300,7 +308,8 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),
         parameters, tuple(entry.get('sides', ('none',))), tuple(entry.get('shapes', ('',))),
-        str(entry.get('onset', '')), str(entry.get('drivetrain', '')),
+        str(entry.get('onset', '')), tuple(entry.get('always', ())),
+        str(entry.get('drivetrain', '')),
         dict(entry.get('needs', {})),
         {form: tuple(others) for form, others in entry.get('stands_for', {}).items()},
         bool(entry.get('tried', True)), tuple(entry.get('sensors', ())),
@@ -327,8 +336,9 @@ def catalogue() -> Mapping[str, EffectKind]:
 
 
 def always_on() -> list[str]:
-    """Return the ids of the effects that add states, so that they cannot begin at an onset."""
-    return [name for name, kind in catalogue().items() if kind.always_on]
+    """Return the effects, or forms of them, that add states and cannot begin at an onset."""
+    return [name for kind in catalogue().values() for name in (
+        [kind.id] if kind.always_on else [f'{kind.id}:{form}' for form in kind.always])]
 
 
 @cache

@@ -11,6 +11,8 @@ from functools import lru_cache
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky import network
+from lg_husky_sim.husky.command_lag import smooth_commands
+from lg_husky_sim.husky.command_lag import STATES as LAG_STATES
 from lg_husky_sim.husky.edits import branch_of, edit, EditedNetwork, stage_of
 from lg_husky_sim.husky.effects import always_on, Effect, Onset
 from lg_husky_sim.husky.laws import MOTOR, WIDTH
@@ -173,7 +175,17 @@ class _Regime:
             name: values[key] for name, key in self.edited.sensors.items()})
         plant = PlantSet(space.A, space.B, space.G, space.H, space.K, rows, rows_u, rows_f,
                          self._laws, self._offsets, coefficients, command, sensors)
-        return close_speed_loop(plant, values) if self.edited.speed_loop else plant
+        if self.edited.speed_loop:
+            plant = close_speed_loop(plant, values)
+        if self.edited.command_lag:
+            plant = smooth_commands(plant, values[self.edited.command_lag])
+        return plant
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """States of the graph and of what controls it."""
+        return (tuple(self.numeric.states) + (LOOP_STATES if self.edited.speed_loop else ())
+                + (LAG_STATES if self.edited.command_lag else ()))
 
 
 @dataclass(frozen=True)
@@ -214,9 +226,7 @@ class HuskyModel:
         except KeyError as error:
             raise ParameterError(
                 f'parameter {error.args[0]!r} is missing; the structure needs it') from error
-        first = self.regimes[0]
-        states = tuple(first.numeric.states) + (LOOP_STATES if first.edited.speed_loop else ())
-        return Plant(sets, states, self.structure.onset)
+        return Plant(sets, self.regimes[0].states, self.structure.onset)
 
 
 def _regime(structure: Structure) -> _Regime:
@@ -233,8 +243,10 @@ def _compiled(drivetrain: Drivetrain, effects: tuple[Effect, ...]) -> tuple[_Reg
     if any(effect.late for effect in effects):
         early = Structure(drivetrain, tuple(e for e in effects if not e.late))
         regimes.insert(0, _regime(early))
-        if len(regimes[0].numeric.states) != len(regimes[1].numeric.states) or (
-                regimes[0].edited.speed_loop != regimes[1].edited.speed_loop):
+        # States of the graph may have other names behind an onset.
+        kinds = [(len(one.numeric.states), one.edited.speed_loop, one.edited.command_lag)
+                 for one in regimes]
+        if kinds[0] != kinds[1]:
             raise ParameterError('an effect with an onset may not add states: '
                                  f'{", ".join(always_on())} are always active')
     return tuple(regimes)

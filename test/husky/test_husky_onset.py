@@ -117,5 +117,5 @@ def test_an_effect_that_is_there_may_change(robot: Maker) -> None:
 
 
 def test_what_was_not_there_cannot_be_there_again(robot: Maker) -> None:
-    with pytest.raises(ParameterError, match='command_latency is there again'):
+    with pytest.raises(ParameterError, match='command_latency is changed at the onset'):
         robot(Effect('command_latency', late=True, again=True), onset=Onset(OnsetKind.TIME, 2.0))

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from lg_husky_sim.husky.effects import always_on, catalogue, Effect, Onset, OnsetKind
+from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model, Drivetrain, Structure
 from lg_husky_sim.husky.model_file import (
     load_model,
@@ -26,8 +26,6 @@ import pytest
 EFFECTS = [Effect(name, side, shape) for name, kind in catalogue().items()
            for side in kind.sides for shape in kind.shapes]
 """The whole catalogue."""
-ALWAYS = always_on()
-"""Effects that add states, which an onset cannot."""
 PARTNERS = 2
 """Of each effect."""
 ONSETS = (None, Onset(OnsetKind.TIME, 0.21), Onset(OnsetKind.PLACE_ABOVE, 0.03),
@@ -45,7 +43,7 @@ def named(effect: Effect) -> str:
 def model_of(pair: tuple[Effect, Effect], onset: Onset | None, late: tuple[bool, bool],
              drivetrain: Drivetrain) -> ModelFile:
     """Return a model of two effects; one that needs an onset begins at it whatever `late`."""
-    effects = [replace(effect, late=effect.id not in ALWAYS and (
+    effects = [replace(effect, late=not effect.always_on and (
         effect.kind.needs_onset or (onset is not None and begins)))
         for effect, begins in zip(pair, late, strict=True)]
     structure = Structure(drivetrain, onset=onset or (

@@ -102,7 +102,7 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
                         at = hypothesis.at(onset)
                         best = Look(at, begin(at, group, coefficients), gain)
         return best
-    open_ones = [h for h in pool if not h.effect.kind.always_on and h.effect.shape != 'grip']
+    open_ones = [h for h in pool if not h.effect.always_on and h.effect.shape != 'grip']
     return [one for one in evidence.pool.map(best_of, open_ones) if one is not None]
 
 

@@ -57,6 +57,8 @@ class EditedNetwork:
         Entries of the sensor model (gyro_bias, ...).
     speed_loop : bool
         Whether the base closes a wheel-speed loop.
+    command_lag : expression
+        Time constant by which the base smooths its commands; empty where it does not.
     grip : expression
         Factor on the limit of a tyre's force.
     """
@@ -66,6 +68,7 @@ class EditedNetwork:
     command: Mapping[str, str] = field(default_factory=dict)
     sensors: Mapping[str, str] = field(default_factory=dict)
     speed_loop: bool = False
+    command_lag: str = ''
     grip: str = ''
 
     def changing(self, command: Mapping[str, str] | None = None,

@@ -15,6 +15,12 @@ def _command(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         p.name: p.name for p in effect.parameters() if not p.fixed})
 
 
+def _slew(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    if effect.shape == 'lag':
+        return replace(network, command_lag='command_lag')
+    return _command(network, effect)
+
+
 def _speed_loop(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     return replace(network, speed_loop=True)
 
@@ -33,7 +39,7 @@ def _stamps(network: EditedNetwork, effect: Effect) -> EditedNetwork:
 
 EDITS = {
     'command_latency': Edit(_command),
-    'command_slew': Edit(_command),
+    'command_slew': Edit(_slew),
     'command_limit': Edit(_command),
     'speed_loop': Edit(_speed_loop),
     'gyro_bias': Edit(_gyro),
