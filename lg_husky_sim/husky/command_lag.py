@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lg_husky_sim.husky.plant import PlantSet
+from lg_husky_sim.husky.speed_loop import clipped
 import numpy as np
 
 #: States that the low pass adds.
@@ -21,7 +22,7 @@ def smooth_commands(plant: PlantSet, lag: float) -> PlantSet:
 
         u' = (r - u) / lag
 
-    A command is limited before it is smoothed.
+    The driver clips the smoothed voltage at its supply.
 
     Parameters
     ----------
@@ -41,7 +42,12 @@ def smooth_commands(plant: PlantSet, lag: float) -> PlantSet:
     a[n:, n:] = -np.eye(2) / lag
     b = np.zeros((n + 2, 2))
     b[n:] = np.eye(2) / lag
-    return replace(
+    smooth = replace(
         plant, a=a, b=b, g=np.vstack([plant.g, np.zeros((2, plant.g.shape[1]))]),
         h=np.hstack([plant.h, plant.k]), k=np.zeros_like(plant.k),
         rows=np.hstack([plant.rows, plant.rows_u]), rows_u=np.zeros_like(plant.rows_u))
+    if not plant.command.clamp:
+        # A speed loop, which clips what it makes of them.
+        return smooth
+    return clipped(smooth, np.hstack([np.zeros((2, n)), np.eye(2)]),
+                   np.vstack([plant.b, np.zeros((2, 2))]), plant.rows_u, plant.command.clamp)

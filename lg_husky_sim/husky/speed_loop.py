@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from lg_husky_sim.husky.laws import CEILING, Law, PLACES, WIDTH, WINDING
 from lg_husky_sim.husky.plant import PlantSet
+from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 #: States that the loop adds.
@@ -56,25 +57,45 @@ def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
     a[n + 2:, n:n + 2] = integral * np.eye(2)
     b = np.zeros((n + 4, 2))
     b[n:n + 2] = np.eye(2) / (transmission * lag)
-    g = np.zeros((n + 4, efforts + 2))
-    g[:n, :efforts] = plant.g
-    g[:n, efforts:] = plant.b
-    g[n + 2:, efforts:] = unwind * np.eye(2)
+    open_loop = replace(
+        plant, a=a, b=b, g=np.vstack([plant.g, np.zeros((4, efforts))]),
+        h=np.hstack([plant.h, np.zeros((plant.h.shape[0], 4))]) + plant.k @ volts,
+        rows=np.hstack([plant.rows, np.zeros((9, 4))]) + plant.rows_u @ volts,
+        k=np.zeros_like(plant.k), rows_u=np.zeros_like(plant.rows_u))
+    return clipped(open_loop, volts, np.vstack([plant.b, np.zeros((2, 2)), unwind * np.eye(2)]),
+                   plant.rows_u, values['supply_voltage'])
+
+
+def clipped(plant: PlantSet, volts: FloatArray, enters: FloatArray, reads: FloatArray,
+            limit: float) -> PlantSet:
+    """
+    Clip voltages that states make.
+
+    Parameters
+    ----------
+    plant : PlantSet
+        Where they are not clipped; its inputs act on states only.
+    volts : numpy.ndarray, shape (2, n)
+        Voltages of the motors [V] by the states.
+    enters, reads : numpy.ndarray, shapes (n, 2), (9, 2)
+        What voltages do to the states, and to the outputs.
+    limit : float
+        [V]
+
+    Returns
+    -------
+    PlantSet
+        With two more laws; what else acts on the driver's voltage sees it clipped.
+    """
     arguments = plant.h.shape[0]
-    h = np.zeros((arguments + 2, n + 4))
-    h[:arguments, :n] = plant.h
-    h[:arguments] += plant.k @ volts
-    h[arguments:] = volts
-    rows = np.hstack([plant.rows, np.zeros((9, 4))]) + plant.rows_u @ volts
-    rows_f = np.hstack([plant.rows_f, plant.rows_u])
     inner = np.array(plant.coefficients)
     places = PLACES[plant.laws]
-    inner[(places > 0) & (places < WINDING), CEILING] = values['supply_voltage']
+    inner[(places > 0) & (places < WINDING), CEILING] = limit
     clip = np.zeros((2, WIDTH))
-    clip[:, 0] = values['supply_voltage']
+    clip[:, 0] = limit
     return replace(
-        plant, a=a, b=b, g=g, h=h, k=np.zeros((arguments + 2, 2)), rows=rows,
-        rows_u=np.zeros((9, 2)), rows_f=rows_f,
+        plant, g=np.hstack([plant.g, enters]), h=np.vstack([plant.h, volts]),
+        k=np.zeros((arguments + 2, 2)), rows_f=np.hstack([plant.rows_f, reads]),
         laws=np.concatenate([plant.laws, np.full(2, int(Law.CLIP), dtype=np.int64)]),
         offsets=np.concatenate([plant.offsets,
                                 np.array([arguments, arguments + 1], dtype=np.int64)]),

@@ -21,7 +21,9 @@ from lg_husky_sim.diagnosis.evidence.noise import (
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.evidence.whitener import MODEL
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -139,3 +141,34 @@ def test_a_decay_faster_than_a_step_of_the_filter_is_slowed_and_no_gain_with_it(
     assert abs(usual[rate]) < abs(stiff[rate]) <= 0.5 / setting('longest_step') + 1e-9
     for gain in (by_moment, by_voltage):
         np.testing.assert_allclose(stiff[gain] / stiff[rate], usual[gain] / usual[rate], rtol=1e-6)
+
+
+def _by_torque(**sizes: float) -> float:
+    # Rate of a wheel by a torque on it [rad/s/(N·m)], with a speed loop of these gains.
+    model, loop = load_model(), Effect('speed_loop')
+    plant = compile_model(model.structure.with_effect(loop)).at(
+        model.parameters.with_entries(*entries_of(loop, {'loop_lag': 0.1, **sizes})))
+    found = slow_model(plant, *(model.parameters[name] for name in (
+        'mass', 'yaw_inertia', 'wheel_inertia')))
+    return float(found[MODEL.index('left_by_left')])
+
+
+def test_a_loop_holds_wheels_at_once_only_where_its_integral_is_fast() -> None:
+    without = _by_torque(loop_gain=1.0, loop_integral=0.0)
+    assert _by_torque(loop_gain=1.0, loop_integral=0.5) == pytest.approx(without, rel=0.05)
+    assert abs(_by_torque(loop_gain=1.0, loop_integral=100.0)) < 1e-9 * without
+
+
+def test_wheels_that_a_loop_holds_are_whitened_to_finite_numbers(
+        setup: tuple[Evidence, Point]) -> None:
+    """Where a command seems lost, the torque of wheels is unsure, of those that it moves."""
+    evidence, _ = setup
+    whitener = known(evidence.whiteners[0])
+    kicks = np.array([[whitener.frame.times[whitener.frame.order[50]], 0.4, 0.4, 0.0, 0.0, 0.0]])
+    frame = replace(whitener.frame, kicks=kicks)
+    usual, held = np.array(whitener.model), np.array(whitener.model)
+    held[[MODEL.index('left_by_left'), MODEL.index('right_by_right')]] = 0.0
+    for model in (usual, held):
+        assert np.all(np.isfinite(whitener_of(frame, model, TRUE).scale))
+    assert np.max(whitener_of(frame, usual, TRUE).scale) > 1.5 * np.max(
+        whitener_of(frame, held, TRUE).scale)

@@ -24,6 +24,17 @@ def _axle_columns(states: tuple[str, ...], values: dict[str, float]) -> tuple[Fl
     return tuple(columns)
 
 
+def _in_balance(a: FloatArray) -> FloatArray:
+    # Inverse of a, without the modes that settle so slowly that they keep what they were.
+    rates, modes = np.linalg.eig(a)
+    kept = np.abs(rates) * setting('slowest_balance') > 1.0
+    if np.all(kept):
+        return np.asarray(np.linalg.inv(a), dtype=np.float64)
+    inverse = np.zeros_like(rates)
+    inverse[kept] = 1.0 / rates[kept]
+    return np.asarray(np.real((modes * inverse) @ np.linalg.inv(modes)), dtype=np.float64)
+
+
 def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: float
                ) -> FloatArray:
     """
@@ -31,7 +42,8 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: flo
 
     The other states are in balance at every moment: with x = (s, f), ``0 = A_fs s + A_ff f +
     E_f d``, so that ``s' = (A_ss - A_sf A_ff^-1 A_fs) s + (E_s - A_sf A_ff^-1 E_f) d``, and the
-    wheels read ``W s + W_d d`` likewise; voltages enter like d. Only for linear deviations from a
+    wheels read ``W s + W_d d`` likewise; voltages enter like d. Modes of A_ff that settle slowly
+    (the integral of a controller) keep what they were instead. Only for linear deviations from a
     simulation.
 
     Parameters
@@ -56,7 +68,7 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: flo
         force, moment, *_axle_columns(states, {'wheel_inertia': wheel_inertia})])
     a_ff = one.a[np.ix_(fast, fast)]
     inputs = np.hstack([inputs, one.b])
-    follow = -np.linalg.solve(a_ff, np.hstack([one.a[np.ix_(fast, slow)], inputs[fast]]))
+    follow = -_in_balance(a_ff) @ np.hstack([one.a[np.ix_(fast, slow)], inputs[fast]])
     a_sf = one.a[np.ix_(slow, fast)]
     a_slow = one.a[np.ix_(slow, slow)] + a_sf @ follow[:, :2]
     e_slow = inputs[slow] + a_sf @ follow[:, 2:]

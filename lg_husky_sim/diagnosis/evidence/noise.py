@@ -159,8 +159,11 @@ def whitener_of(frame: Frame, model: FloatArray, noise: Noise) -> Whitener:
     initial[8:10] = setting('start_place') ** 2
     initial[10:12] = setting('start_angle') ** 2
     kicks = np.array(frame.kicks)
-    kicks[:, 1:3] /= np.array([model[MODEL.index('left_by_left')],
-                              model[MODEL.index('right_by_right')]]) ** 2
+    # The torque of a wheel that no torque moves is not unsure: its loop holds it.
+    moved = np.array([model[MODEL.index('left_by_left')],
+                      model[MODEL.index('right_by_right')]]) ** 2
+    stiff = moved < setting('unmoved') ** 2
+    kicks[:, 1:3] = np.where(stiff, 0.0, kicks[:, 1:3] / np.where(stiff, 1.0, moved))
     gains(frame.times, frame.drive.channels, frame.order, variance, frame.cosine, frame.sine,
           model, process, initial, setting('longest_step'), kicks, gain, scale)
     return Whitener(frame, model, process, gain, scale)

@@ -133,31 +133,40 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
     Tried or None
         None where it cannot be simulated.
     """
-    starts = []
+    starts: dict[bytes, tuple[float, Point]] = {}
     for point, numbers in begins:
         try:
             start = hypothesis.point(point, numbers)
-            starts.append((evidence.cost(evidence.residuals(evidence.predict(start)), start),
-                           start))
+            cost = evidence.cost(evidence.residuals(evidence.predict(start)), start)
         except LgHuskyError:
             continue
-    if not starts:
-        return None
-    start = min(starts, key=lambda one: one[0])[1]
+        # Far from a base that has absorbed the effect no start is as good as there, however
+        # far down it leads: each point is a beginning then.
+        key = point.places.tobytes() if is_distorted(base) else b''
+        if key not in starts or cost < starts[key][0]:
+            starts[key] = cost, start
     size = len(base.point.unknowns)
-    own = range(size, len(start.unknowns))
-    slopes = [np.hstack([one, np.zeros((one.shape[0], len(own)))]) for one in base.slopes]
     few = int(setting('whole_rounds'))
-    try:
-        best = evidence.fit(start, slopes, rounds=few, renew=own)
-        if best.cost < base.cost + setting('lost'):
-            best = evidence.fit(best.point, best.slopes, renew=own)
-            if whole:
-                best = evidence.fit(best.point, rounds=few)
-    except LgHuskyError:
-        # On the brink of running away.
-        return None
-    return Tried(hypothesis, best, base.cost - best.cost, evidence.count)
+    found = []
+    for _, start in starts.values():
+        own = range(size, len(start.unknowns))
+        slopes = [np.hstack([one, np.zeros((one.shape[0], len(own)))]) for one in base.slopes]
+        try:
+            best = evidence.fit(start, slopes, rounds=few, renew=own)
+            if best.cost < base.cost + setting('lost'):
+                best = evidence.fit(best.point, best.slopes, renew=own)
+                if whole:
+                    best = evidence.fit(best.point, rounds=few)
+        except LgHuskyError:
+            # On the brink of running away.
+            continue
+        found.append(Tried(hypothesis, best, base.cost - best.cost, evidence.count))
+    return max(found, key=lambda one: one.gain, default=None)
+
+
+def is_distorted(base: Fit) -> bool:
+    """Return whether recalibrated numbers may have taken the place of an effect."""
+    return 0.5 * float(np.sum(base.point.prior_residuals ** 2)) >= setting('distorted')
 
 
 def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
@@ -317,6 +326,9 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
         numbers = [one.numbers, *(other.numbers for other in further
                                   if other.hypothesis.label == one.hypothesis.label
                                   and other is not one)]
+        if len(points) > 1:
+            # What a look promises from one point says little at another.
+            numbers += one.hypothesis.starts
         result = attempt(evidence, base, one.hypothesis, list(itertools.product(points, numbers)),
                          whole=False)
         if result is not None:

@@ -19,12 +19,13 @@ from lg_husky_sim.diagnosis.selection.rounds import (
     calibrated,
     fitted,
     forward_step,
+    is_distorted,
     numbers_of,
     Round,
     Tried,
     with_jitter,
 )
-from lg_husky_sim.diagnosis.selection.screening import look
+from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -87,10 +88,17 @@ def _as_logged(evidence: Evidence, base: Fit) -> Logged:
     if chosen is base:
         return Logged(base)
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
-    seen = look(evidence, base, pool)[:int(setting('early_effects'))]
-    early = fitted(evidence, base, seen, [base.point], whole=False)
+    early = fitted(evidence, base, _promising(evidence, base, pool), [base.point], whole=False)
     better = [t for t in early if t.gain > _promised(base, chosen)]
     return Logged(base if better else chosen, better, early)
+
+
+def _promising(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis]) -> list[Look]:
+    # The looks at the effects that promise most, each in its best form.
+    best: dict[str, Look] = {}
+    for one in look(evidence, base, pool):
+        best.setdefault(one.hypothesis.effect.id, one)
+    return list(best.values())[:int(setting('early_effects'))]
 
 
 def _promised(base: Fit, chosen: Fit) -> float:
@@ -128,7 +136,7 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tri
         The effect that gains most from there, with numbers, noise and reading of its own; none
         where the prior penalty of the recalibration is small.
     """
-    if 0.5 * float(np.sum(base.point.prior_residuals ** 2)) < setting('distorted'):
+    if not is_distorted(base):
         return []
     names = [u.name for u in base.point.unknowns]
     found = []
@@ -144,7 +152,7 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tri
         pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
         found.append(_best_start(first, rough, [
             (one.hypothesis, rough.point.places, one.numbers)
-            for one in look(first, rough, pool)[:int(setting('early_effects'))]]))
+            for one in _promising(first, rough, pool)]))
     seeds = [_own(*one, base) for one in found if one is not None]
     return [max(seeds, key=lambda one: one.score)] if seeds else []
 
