@@ -114,8 +114,9 @@ def report_data(
     about += [(name, 'another recording of the same drive') for name in columns
               if name not in {named.label for named in plants}]
     seconds = sum(segment.duration for segment, _ in parts)
-    notes = [f'The commands were replayed from the measured state at the start of each of '
-             f'{plural(len(parts), "segment")}'
+    starts = ('of the only segment' if len(parts) == 1 else
+              f'of each of {plural(len(parts), "segment")}')
+    notes = [f'The commands were replayed from the measured state at the start {starts}'
              + (f', anew every {horizon:g} s' if horizon else '')
              + f'. Errors are {SIGN}; x is ahead and y to the left of the robot as it stood at '
              'the start.']
@@ -137,7 +138,7 @@ def _headline(table: ErrorTable, recordings: int, seconds: float) -> Headline:
     rows = {row.name: row for row in table.rows}
     shown = [quantity_with_unit(one) for one in RANKED]
     key = next((one for one in RANKED if quantity_with_unit(one) in rows), '')
-    drives = ('Recordings', f'{recordings}, {seconds:.0f} s')
+    drives = ('Driven', f'{seconds:.0f} s in {plural(recordings, "recording")}')
     if not key:
         return Headline('No error can be computed', facts=(drives,))
     unit = quantity_with_unit(key).partition('[')[2].rstrip(']')

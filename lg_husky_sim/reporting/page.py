@@ -29,6 +29,7 @@ from lg_husky_sim.reporting.words import (
     quantity,
     quantity_with_unit,
     SIGN,
+    UNKNOWN,
 )
 
 if TYPE_CHECKING:
@@ -135,12 +136,11 @@ def _parameter(one: ParameterRow) -> dict[str, Any]:
                   'value_at': f'{at(one.value):.1f}', 'nominal_at': f'{at(one.nominal):.1f}',
                   'words': f'{number(one.value)} within {number(one.least)} to '
                            f'{number(one.most)}'}
-    moved = 100.0 * (one.value / one.nominal - 1.0) if one.nominal else math.nan
+    moved = change(1.0, one.value / one.nominal, 1) if one.nominal else UNKNOWN
     return {'name': breakable(one.name), 'nominal': number(one.nominal, 4),
             'value': number(one.value, 4), 'interval': interval,
             'unit': '' if one.unit == '1' else one.unit, 'at_bound': one.at_bound,
-            'change': f'{moved:+.1f} %'.replace('-', '−') if math.isfinite(moved) else '–',
-            'drawn': drawn, **places}
+            'change': moved, 'drawn': drawn, **places}
 
 
 def _mismatches(shown: Sequence[Mismatch], jumps: Mapping[int, int]) -> list[dict[str, Any]]:

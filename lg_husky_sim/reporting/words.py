@@ -94,9 +94,11 @@ def with_unit(value: float, unit: str, digits: int = 3) -> str:
     return f'{number(value, digits)} {unit}' if unit not in ('', '1') else number(value, digits)
 
 
-def change(before: float, after: float) -> str:
+def change(before: float, after: float, decimals: int = 0) -> str:
     """Return a change in per cent with its sign; a dash where there is none."""
     if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
         return UNKNOWN
-    share = round(100.0 * (after / before - 1.0)) + 0.0  # no minus zero
-    return f'×{after / before:.1f}' if share > 999 else f'{share:+.0f}\u00a0%'.replace('-', '−')
+    share = round(100.0 * (after / before - 1.0), decimals) + 0.0  # no minus zero
+    if share > 999:
+        return f'×{after / before:.1f}'
+    return f'{share:+.{decimals}f}\u00a0%'.replace('-', '−')

@@ -176,7 +176,7 @@ def test_a_parameter_is_drawn_within_what_the_fit_allows() -> None:
         ParameterRow('track', 'm', 0.5, 0.6, 0.58, 0.65, 0.4, 0.6, True),
         ParameterRow('gain', '1', 1.0, 2.0)))
     assert (inside['left'], inside['width'], inside['value_at']) == ('60.0', '30.0', '75.0')
-    assert inside['change'] == '+10.0 %'
+    assert inside['change'] == '+10.0\u00a0%'
     assert edge['at_bound']
     assert float(edge['left']) + float(edge['width']) == 100.0  # cut off, not drawn beside it
     assert not free['drawn']

@@ -13,6 +13,7 @@ from lg_husky_sim.diagnosis.sensors.relations import by_names, Relation
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import ModelFileError
 from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.reporting.words import number
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.yaml_files import read_yaml
 
@@ -153,12 +154,12 @@ def _bias(known: Known) -> list[Fault]:
         return []  # the pose, or a robot that drifts: wheels and gyro agree
     scale = -1.0 / one.factor.value
     low, high = sorted((one.offset.low * scale, one.offset.high * scale))
-    number = Number(one.offset.value * scale, low, high)
+    bias = Number(one.offset.value * scale, low, high)
     effect = effect_of('bias')
-    return [Fault(effect, 'imu', _number(effect, number),
+    return [Fault(effect, 'imu', _number(effect, bias),
                   _beyond(one.offset, 0.0, tolerance),
-                  f'The gyro reads {number.value:+.4f} rad/s ({number.low:+.4f} to '
-                  f'{number.high:+.4f}) at rest, against the heading of the pose')]
+                  f'The gyro reads {number(bias.value)} rad/s ({number(bias.low)} to '
+                  f'{number(bias.high)}) at rest, against the heading of the pose')]
 
 
 def _late(known: Known) -> list[Fault]:
@@ -200,9 +201,9 @@ def _unphysical(one: Relation | None) -> bool:
 
 def _late_wheels(wheels: Mapping[str, Relation | None]) -> Fault:
     found = [one.late for one in wheels.values() if one is not None]
-    number = Number(sum(n.value for n in found) / len(found), min(n.low for n in found),
-                    max(n.high for n in found))
-    return _stamps('wheels', number, ('imu', 'pose'))
+    late = Number(sum(n.value for n in found) / len(found), min(n.low for n in found),
+                  max(n.high for n in found))
+    return _stamps('wheels', late, ('imu', 'pose'))
 
 
 def _stamps(stream: str, late: Number, others: tuple[str, ...]) -> Fault:
@@ -212,7 +213,8 @@ def _stamps(stream: str, late: Number, others: tuple[str, ...]) -> Fault:
     return Fault(
         effect, stream, _number(effect, late),
         _beyond(late, 0.0, setting('late_tolerance')),
-        f'The stamps of {WORDS[stream]} are {abs(late.value):.2f} s ({low:.2f} to {high:.2f}) '
+        f'The stamps of {WORDS[stream]} are {number(abs(late.value))} s ({number(low)} to '
+        f'{number(high)}) '
         f'{how} than those of {" and ".join(WORDS[other] for other in others)}')
 
 
@@ -222,6 +224,7 @@ def _pair(first: str, second: str, one: Relation) -> Fault:
         first, second, late = second, first, _turned_about(late, True)
     return Fault(None, '', _number(effect_of('late'), late),
                  _beyond(late, 0.0, setting('late_tolerance')),
-                 f'The stamps of {WORDS[first]} are {late.value:.2f} s ({late.low:.2f} to '
-                 f'{late.high:.2f}) later than those of {WORDS[second]}, further than a robot '
+                 f'The stamps of {WORDS[first]} are {number(late.value)} s '
+                 f'({number(late.low)} to {number(late.high)}) later than those of '
+                 f'{WORDS[second]}, further than a robot '
                  'lags its wheels; a third stream would tell which of them is at fault')
