@@ -11,7 +11,7 @@ from lg_husky_sim.diagnosis.before_after.settings import settings as before_afte
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import LATENESS, lateness_words, PHASE, sized
-from lg_husky_sim.husky.effects import catalogue, effect_kind, Onset, OnsetKind
+from lg_husky_sim.husky.effects import catalogue, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.data import (
     Advice,
@@ -162,7 +162,8 @@ def implausible(rows: Sequence[ParameterRow]) -> tuple[str, ...]:
         'absorb may have ended up in the finding.',)
 
 
-def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple[Advice, ...]:
+def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str], *,
+           changed: bool = False) -> tuple[Advice, ...]:
     """
     Return what to change on the robot and in the simulator.
 
@@ -171,6 +172,8 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
     diagnosis : Diagnosis
     shapes : mapping of (str, str) to str
         Variant of form of each effect of the model, by its id and side.
+    changed : bool
+        Whether the question was what changed between recordings.
 
     Returns
     -------
@@ -193,13 +196,11 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
         if finding.side in _WHEELS:
             values |= {'where': f'{finding.side} side', 'wheels': _WHEELS[finding.side]}
         values |= _stream_words(finding, shapes.get((finding.effect, finding.side), ''))
-        other = before_after().advice.get(finding.effect)
-        if other is not None:
-            robot += other
-            continue
-        remedy = effect_kind(finding.effect).advice
-        robot += filled(remedy.robot, values)
-        simulator += filled(remedy.simulator, values)
+        kind = catalogue().get(finding.effect)
+        if kind is not None:
+            simulator += filled(kind.advice.simulator, values)
+        robot += _for_a_change(finding, values) if changed else (
+            filled(kind.advice.robot, values) if kind is not None else ())
     for group in diagnosis.indistinguishable:
         tell = '; '.join((*group.sensors, *group.manoeuvres))
         names = ', '.join(name.replace('_', ' ') for name in group.effects)
@@ -212,6 +213,18 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str]) -> tuple
                          '--ros-args -p model:=model.yaml`.')
     parts = (('On the robot', robot), ('In the simulator', simulator))
     return tuple(Advice(where, tuple(lines)) for where, lines in parts if lines)
+
+
+def _for_a_change(finding: Finding, values: Mapping[str, float | str]) -> tuple[str, ...]:
+    # Of the catalogue where it fits; a change has numbers of its own names.
+    known, kind = before_after().advice, catalogue().get(finding.effect)
+    what = finding.statement.partition(':')[0]
+    for sentences in (known.get(finding.effect, ()), kind.advice.robot if kind else (),
+                      known['default']):
+        lines = filled(sentences, {**values, 'change': what[:1].lower() + what[1:]})
+        if lines:
+            return lines
+    return ()
 
 
 def _which(diagnosis: Diagnosis) -> str:
@@ -343,7 +356,7 @@ def report_data(
         f'{"What changed in " if changed else "Diagnosis of "}{", ".join(recordings)}',
         headline(diagnosis, warnings, changed=changed), columns,
         tuple((name, about[name]) for name in columns), tuple(traces), tuple(errors),
-        advice(diagnosis, shapes or {}), view,
+        advice(diagnosis, shapes or {}, changed=changed), view,
         tuple(Mismatch(m.recording, _SIGNALS.get(m.channel, m.channel), m.start,
                        m.end, m.strength, m.subsystem)
               for m in diagnosis.mismatch),

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 
-from lg_husky_sim.diagnosis.before_after.settings import settings
+from lg_husky_sim.diagnosis.before_after.settings import Change, settings
 from lg_husky_sim.diagnosis.report import advice, competing, headline, implausible, losses
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Rivalry, Verdict
 from lg_husky_sim.diagnosis.wording import sentence, sized
@@ -74,7 +74,7 @@ def test_a_change_of_the_floor_has_no_side_and_its_numbers_no_other_unit() -> No
     diagnosis = _diagnosis(Verdict.KNOWN, slope)
     facts = dict(headline(diagnosis, changed=True).facts)
     assert (facts['Side'], facts['Acts']) == ('whole robot', 'in the later recordings')
-    robot = advice(diagnosis, {})[0].sentences
+    robot = advice(diagnosis, {}, changed=True)[0].sentences
     assert any('level floor' in line for line in robot)
     assert not any('0.345' in line for line in robot)
 
@@ -85,6 +85,17 @@ def test_advice_takes_numbers_of_before_and_after_in_their_unit_only() -> None:
         said = names_in(' '.join((*kind.advice.robot, *kind.advice.simulator)))
         for one in kind.parameters:
             assert one.name not in said or others.get(one.name, one.unit) == one.unit, one.name
+
+
+@pytest.mark.parametrize('change', settings().changes, ids=lambda one: one.effect)
+def test_every_change_says_what_to_do_on_the_robot(change: Change) -> None:
+    units = {one.name: one.unit for one in settings().quantities}
+    found = _finding(change.effect, change.side, *(
+        Estimate(name, 1.0, units[name], 0.9, 1.1) for name in change.parameters))
+    parts = {one.where: one.sentences for one in advice(
+        _diagnosis(Verdict.KNOWN, found), {}, changed=True)}
+    assert parts['On the robot']
+    assert not any('{' in line for lines in parts.values() for line in lines)
 
 
 @pytest.mark.parametrize(('verdict', 'changed', 'text', 'tone'), [
