@@ -46,6 +46,7 @@ from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
+from lg_husky_sim.reporting.words import quantity_with_unit
 import numpy as np
 
 
@@ -121,7 +122,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         left = remaining(found)
         rest = efforts(left.evidence, left.final)
         free = missing_efforts(left.evidence, left.final)
-        progress('numbers', 0.9)
+        progress('intervals', 0.9)
         said, features = _diagnosis(found, left, rest, free, parts, nominal, there)
         if different:
             progress('another robot: what differs', 0.92)
@@ -202,9 +203,11 @@ def _remaining(found: Search, rest: Sequence[Effort]) -> str:
         first = rest[0]
         of = PAST[first.argument][2] if first.argument in PAST else (
             first.argument.replace('_', ' '))
-        text.append(f'the best smooth description of the remaining residual is a '
-                    f'{first.balance.replace("_", " ")} as a function of {of}, with a log '
-                    f'evidence of {first.evidence:.1f} nats')
+        what = {'torque_left': 'torque on the left wheels',
+                'torque_right': 'torque on the right wheels',
+                'moment': 'yaw moment'}.get(first.balance, first.balance)
+        text.append(f'the best smooth description of the remaining residual is a {what} as a '
+                    f'function of {of}, with a log evidence of {first.evidence:.1f} nats')
     last = found.rounds[-1]
     if last.tried and not (found.found and last is found.rounds[len(found.found) - 1]):
         best = last.tried[0]
@@ -221,8 +224,8 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
              and augmented[name] > (1.0 + setting('worse')) * plain[name]] if found.found else []
     if worse:
         notes.append('held-out errors that grow with the finding: '
-                     + ', '.join(f'{name} {plain[name]:.3g} to {augmented[name]:.3g}'
-                                 for name in worse))
+                     + ', '.join(f'{quantity_with_unit(name)} from {plain[name]:.3g} to '
+                                 f'{augmented[name]:.3g}' for name in worse))
     most = setting('most_tolerances')
     moved = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.prior_residuals,
                                     strict=True) if abs(s) > most and u.kind == 'model']

@@ -11,7 +11,7 @@ from lg_husky_sim.diagnosis.before_after.settings import settings as before_afte
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import LATENESS, lateness_words, PHASE, sized
-from lg_husky_sim.husky.effects import catalogue, Onset, OnsetKind
+from lg_husky_sim.husky.effects import catalogue, effect_kind, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.data import (
     Advice,
@@ -37,9 +37,16 @@ _WHEELS = {'left': 'the left wheels', 'right': 'the right wheels'}
 _SIGNALS = {'advance': 'forward', 'turn': 'yaw_rate'}
 
 
+def name_of(effect: str) -> str:
+    """Return what reports call an effect."""
+    if effect in catalogue():
+        return effect_kind(effect).name
+    return before_after().names.get(effect, effect.replace('_', ' '))
+
+
 def effect_words(finding: Finding) -> str:
     """Return effect and side in words, such as ``torque ripple, left side``."""
-    name = 'an unknown effect' if finding.effect == 'unknown' else finding.effect.replace('_', ' ')
+    name = 'an unknown effect' if finding.effect == 'unknown' else name_of(finding.effect)
     side = {'left': ', left side', 'right': ', right side'}.get(finding.side, '')
     return name + side
 
@@ -55,14 +62,27 @@ def onset_words(onset: Onset | None) -> str:
     return f'where x is {side} {number(onset.value)} m'
 
 
-def size_words(one: Estimate) -> str:
+def label_of(name: str, *, changed: bool = False) -> str:
+    """Return what reports call a number; one of the base robot by its meaning."""
+    if changed:
+        for one in before_after().quantities:
+            if one.name == name:
+                return one.meaning
+    return name.replace('_', ' ')
+
+
+def _acts(finding: Finding, changed: bool) -> str:
+    return 'in the later recordings' if changed else onset_words(finding.onset)
+
+
+def size_words(one: Estimate, *, changed: bool = False) -> str:
     """Return a number with its name and interval."""
     if one.name == LATENESS or one.name.removesuffix('_late') in _STREAMS:
         return f'stamps {lateness_words(one)}'
     unit = '' if one.unit in ('', '1') else f' {one.unit}'
     interval = f' ({number(one.low)} to {number(one.high)})' if (
         math.isfinite(one.low) and math.isfinite(one.high)) else ''
-    return f'{one.name.replace("_", " ")} {number(one.value)}{unit}{interval}'
+    return f'{label_of(one.name, changed=changed)} {number(one.value)}{unit}{interval}'
 
 
 def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: bool = False
@@ -112,18 +132,18 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
 
 def _facts(finding: Finding, several: bool, changed: bool) -> tuple[tuple[str, str], ...]:
     # The phase of a ripple says where on the wheel, not how large.
-    sizes = [size_words(one) for one in sized(finding.parameters)
+    sizes = [size_words(one, changed=changed) for one in sized(finding.parameters)
              if not one.name.startswith(PHASE)]
     words = '; '.join(sizes) or '–'
     if several:
         return ((f'Size of {effect_words(finding)}', words),)
     kind = catalogue().get(finding.effect)
     sided = kind is not None and set(kind.sides) & {'left', 'right', 'both'}
-    return (('Effect', finding.effect.replace('_', ' ')),
+    return (('Effect', name_of(finding.effect)),
             ('Side', finding.side if sided and finding.side != 'none' else 'whole robot'),
             # More than two numbers are read better in the sentence than in a small box.
             *((('Size', words),) if len(sizes) <= 2 else ()),
-            ('Acts', 'in the later recordings' if changed else onset_words(finding.onset)))
+            ('Acts', _acts(finding, changed)))
 
 
 def losses(tables: Sequence[ErrorTable]) -> tuple[str, ...]:
@@ -203,7 +223,7 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str], *,
             filled(kind.advice.robot, values) if kind is not None else ())
     for group in diagnosis.indistinguishable:
         tell = '; '.join((*group.sensors, *group.manoeuvres))
-        names = ', '.join(name.replace('_', ' ') for name in group.effects)
+        names = ', '.join(map(name_of, group.effects))
         if tell:
             robot.append('Before repairing anything: these recordings do not distinguish '
                          f'{names}. '
@@ -253,22 +273,27 @@ def competing(diagnosis: Diagnosis) -> tuple[Section, ...]:
             continue
         top = max(finding.held_out_gain, *(one.held_out_gain for one in finding.rivals), 1e-9)
         rows: list[tuple[str | Cell, ...]] = [
-            (effect_words(finding), Cell(number(finding.held_out_gain),
+            (effect_words(finding), Cell(_nats(finding.held_out_gain),
                                          max(finding.held_out_gain, 0.0) / top, Tone.GOOD))]
         for one in sorted(finding.rivals, key=lambda r: -r.held_out_gain):
             side = one.side if one.side in ('left', 'right') else ''
-            rows.append((', '.join(part for part in (one.effect.replace('_', ' '), side) if part),
-                         Cell(number(one.held_out_gain), max(one.held_out_gain, 0.0) / top)))
+            rows.append((', '.join(part for part in (name_of(one.effect), side) if part),
+                         Cell(_nats(one.held_out_gain), max(one.held_out_gain, 0.0) / top)))
         tables.append(Table(('effect', 'gain [nats]'), tuple(rows)))
         near = max(finding.rivals, key=lambda r: r.held_out_gain)
         share = near.held_out_gain / finding.held_out_gain if finding.held_out_gain > 0.0 else 0.0
         if share > 0.0:
             text.append(f'Runner-up to {effect_words(finding)}: '
-                        f'{near.effect.replace("_", " ")}, with {100.0 * share:.0f} % of its '
+                        f'{name_of(near.effect)}, with {100.0 * share:.0f} % of its '
                         'gain.')
     text.append('The gain is the log-likelihood ratio of the model with the effect to the one '
                 'without it, everything else refitted (1 nat is a factor of 2.7).')
     return (Section('Competing effects', tuple(text), tables=tuple(tables)),) if tables else ()
+
+
+def _nats(gain: float) -> str:
+    # Hundredths of a nat are nothing.
+    return number(round(gain, 2) + 0.0)
 
 
 def unexplained_sensors(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -282,19 +307,20 @@ def unbroken(text: str) -> str:
     return text.replace(' ', '\N{NO-BREAK SPACE}').replace('-', '\N{NON-BREAKING HYPHEN}')
 
 
-def found_numbers(diagnosis: Diagnosis) -> tuple[Section, ...]:
+def found_numbers(diagnosis: Diagnosis, *, changed: bool = False) -> tuple[Section, ...]:
     """Return the numbers of the findings with their intervals and evidence."""
     rows, points = [], []
     for finding in diagnosis.findings:
         if finding.effect == 'unknown' and not diagnosis.fits:
             continue
-        rows += [(effect_words(finding), one.name.replace('_', ' '), number(one.value, 4),
+        rows += [(effect_words(finding), label_of(one.name, changed=changed), number(one.value, 4),
                   f'{number(one.low, 4)} to {number(one.high, 4)}',
                   '' if one.unit == '1' else one.unit) for one in sized(finding.parameters)]
         place = f'Elements of the graph: {", ".join(finding.elements)}. ' if (
             finding.elements) else ''
-        points.append(f'{capitalised(effect_words(finding))} ({finding.subsystem}): shows '
-                      f'{finding.regime or "everywhere"}; acts {onset_words(finding.onset)}. '
+        known = '' if finding.effect == 'unknown' else f'`{finding.effect}`, '
+        points.append(f'{capitalised(effect_words(finding))} ({known}{finding.subsystem}): shows '
+                      f'{finding.regime or "everywhere"}; acts {_acts(finding, changed)}. '
                       f'{place}Gain {number(finding.held_out_gain)} nats'
                       f'{"; " + unbroken(finding.chance) if finding.chance else ""}.')
     tables = (Table(('effect', 'parameter', 'estimate', '95 % interval', 'unit'), tuple(rows)),)
@@ -361,7 +387,8 @@ def report_data(
                        m.end, m.strength, m.subsystem)
               for m in diagnosis.mismatch),
         tuple(parameters),
-        sections=(*found_numbers(diagnosis), *competing(diagnosis), *sections), notes=notes,
+        sections=(*found_numbers(diagnosis, changed=changed), *competing(diagnosis), *sections),
+        notes=notes,
         files=(('model.yaml', f'is the {_which(diagnosis)}'),
                ('plain.yaml', 'is the model of the earlier recordings' if changed else
                 'is the recalibrated model with nothing added'),

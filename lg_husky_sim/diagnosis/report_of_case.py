@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 import re
 from typing import TYPE_CHECKING
@@ -157,7 +157,7 @@ def _where(case: Case) -> tuple[Section, ...]:
         tables = [Table(('balance', 'relative evidence'), tuple(
             (name.replace('_', ' '), Cell(f'{100.0 * share:.0f} %', share))
             for name, share in strengths(efforts).items()))]
-        charts = _efforts(efforts)
+        charts = _efforts(efforts, strengths(efforts))
     terms = new_terms(diagnosis.model, plain)
     sections = [Section(
         'Where in the model', text=('New terms in the equations:',) if terms else (),
@@ -177,10 +177,13 @@ def _where(case: Case) -> tuple[Section, ...]:
     return tuple(sections)
 
 
-def _efforts(efforts: Sequence[Missing]) -> list[Chart]:
-    # Of the best balance, in the drive where it is strongest; both sides where it is a wheel's.
+def _efforts(efforts: Sequence[Missing], shares: Mapping[str, float]) -> list[Chart]:
+    # Of the best balance, in the drive where it is strongest; both sides of a wheel's torque, but
+    # none that explains 0 %.
     best = max(efforts, key=lambda e: e.evidence).balance
-    wanted = ('torque_left', 'torque_right') if best.startswith('torque') else (best,)
+    sides = [name for name in ('torque_left', 'torque_right')
+             if round(100.0 * shares.get(name, 0.0)) > 0]
+    wanted = sides if best.startswith('torque') else [best]
     charts = []
     for place, balance in enumerate(wanted):
         own = [e for e in efforts if e.balance == balance]

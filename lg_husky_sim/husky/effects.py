@@ -176,6 +176,8 @@ class EffectKind:
         What tells it apart from others: a sensor that sees it directly, a drive that brings it
         out.
     advice : Remedy
+    name : str
+        What reports call it.
     """
 
     id: str  # noqa: A003
@@ -194,6 +196,7 @@ class EffectKind:
     sensors: tuple[str, ...] = ()
     manoeuvres: tuple[str, ...] = ()
     advice: Remedy = Remedy()
+    name: str = ''
 
     @property
     def needs_onset(self) -> bool:
@@ -315,7 +318,7 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
         bool(entry.get('tried', True)), tuple(entry.get('sensors', ())),
         tuple(entry.get('manoeuvres', ())),
         Remedy(*(tuple(entry.get('advice', {}).get(place, ())) for place in (
-            'robot', 'simulator'))))
+            'robot', 'simulator'))), str(entry.get('name', name.replace('_', ' '))))
 
 
 @cache

@@ -211,3 +211,14 @@ def test_parameters_at_their_bounds_are_called_implausible() -> None:
     assert warning.startswith(
         '1 of 2 recalibrated parameters is at its bound (wheel damping): the recalibration is')
     assert implausible(rows[1:]) == ()
+
+
+def test_reports_call_effects_and_numbers_by_names_of_the_field() -> None:
+    dry = _finding('coulomb_drivetrain', 'left', Estimate('dry_left', 6.43, 'N·m', 5.74, 7.13))
+    known = headline(_diagnosis(Verdict.KNOWN, dry))
+    assert known.text == 'Missing effect found: dry friction in the drivetrain, left side'
+    changed = headline(_diagnosis(Verdict.KNOWN, dry), changed=True)
+    assert dict(changed.facts)['Size'] == (
+        'dry friction of the left drivetrain 6.43 N·m (5.74 to 7.13)')
+    moved = headline(_diagnosis(Verdict.KNOWN, _finding('com_shift', 'both')), changed=True)
+    assert moved.text == 'What changed: shift of the centre of mass'

@@ -124,6 +124,7 @@ class Settings:
     aliases: Mapping[str, tuple[str, ...]]
     separations: tuple[Separation, ...]
     advice: Mapping[str, tuple[str, ...]]
+    names: Mapping[str, str]
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -209,6 +210,7 @@ def settings() -> Settings:
                         {name: tuple(others) for name, others in content['aliases'].items()},
                         tuple(Separation(frozenset(e['effects']), tuple(e['sensors']),
                                          tuple(e['drives'])) for e in content['separations']),
-                        {name: tuple(lines) for name, lines in content['advice'].items()})
+                        {name: tuple(lines) for name, lines in content['advice'].items()},
+                        dict(content['names']))
     except (KeyError, TypeError, AttributeError) as error:
         raise DiagnosisError(f'{path} cannot be understood: {error!r}') from error

@@ -229,7 +229,7 @@ def _at_ticks(known: _Recalibrated, start: Point, progress: Progress) -> _Recali
     drives = ticking(known.evidence, known.base)
     if drives is None:
         return None
-    progress('a base that ticks', 0.08)
+    progress('update rate of the base', 0.08)
     first = known.first
     own = tick_unknowns(drives)
     start = replace(start, unknowns=(*start.unknowns, *own),
