@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 import pkgutil
 import re
@@ -238,7 +239,23 @@ def test_a_fit_recovers_what_drove_and_shows_itself(drive: Path, tmp_path: Path)
     axes = figure.subplots()
     assert fit.plot(axes) is axes
     assert 'mass' in fit._repr_html_()
-    assert all(path.is_file() for path in fit.save(tmp_path / 'fit.yaml'))
+    paths = fit.save(tmp_path / 'fit.yaml')
+    assert all(path.is_file() for path in paths)
+    page = paths[-1].read_text(encoding='utf-8')
+    assert page.index('<h2>What to change</h2>') < page.index('<h2>Parameters</h2>')
+    assert 'model:=fit.yaml' in page
+    assert fit.what_to_change.errors == ()
+
+
+def test_a_fit_says_what_still_differs_from_it(drive: Path) -> None:
+    """The robot of the drive starts late: no mass makes up for that."""
+    recording = lg.read(drive)
+    late = recording.command
+    moved = replace(recording, streams={**recording.streams, 'command': type(late)(
+        late.times - 0.4, late.values, late.names)})
+    fit = lg.Husky(mass=60.0).identify(moved, free=['mass'], starts=1, progress=False)
+    assert [one.kind for one in fit.what_to_change.errors] == ['late']
+    assert 'latency' in ' '.join(fit.what_to_change.errors[0].simulator)
 
 
 def test_an_unknown_method_lists_those_there_are(drive: Path) -> None:

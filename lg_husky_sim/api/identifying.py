@@ -6,15 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 import tempfile
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim import recording as rec
 from lg_husky_sim.api.progress import Shown, shown
 from lg_husky_sim.api.recordings import PathLike, read_all, Recordings, Topics
 from lg_husky_sim.api.robots import Husky
 from lg_husky_sim.api.tables import page_part, Table
+from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.errors import FitError
 from lg_husky_sim.extras import require
 from lg_husky_sim.identification.estimate import estimate
@@ -22,6 +24,9 @@ from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.identification.report import write_fit
 from lg_husky_sim.identification.result import FitResult, Method
 from lg_husky_sim.reporting.provenance import provenance
+
+if TYPE_CHECKING:
+    from lg_husky_sim.diagnosis.prediction_errors import Assessment
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +75,15 @@ class Fit:
     def undetermined(self) -> tuple[str, ...]:
         """What these data cannot determine, in sentences."""
         return self.result.undetermined
+
+    @cached_property
+    def what_to_change(self) -> Assessment:
+        """How the recordings still differ from the fitted model, and what to change."""
+        from lg_husky_sim.diagnosis.prediction_errors import assess
+
+        plant = self.husky.plant
+        return assess([(part, replay(plant, part)) for part in self.segments],
+                      'the fitted model', self.result.model.parameters)
 
     def table(self) -> Table:
         """Return the estimates with their 95 % intervals."""
@@ -133,7 +147,7 @@ class Fit:
             If the name cannot be used.
         """
         return write_fit(self.result, self.segments, self.before.model, Path(path),
-                         provenance(self.sources))
+                         provenance(self.sources), self.what_to_change.advice())
 
     def report(self, path: PathLike | None = None) -> Path:
         """Write everything, into a temporary folder by default; return the page."""
@@ -150,7 +164,9 @@ class Fit:
             f'Fit of {", ".join(self.result.recordings)}',
             [f'{self.result.method.value}, {self.result.evaluations} simulations, {state}'],
             [self.table(), self.channels()],
-            {'Warnings': self.warnings, 'What these data cannot determine': self.undetermined})
+            {'Warnings': self.warnings,
+             **{one.where: one.sentences for one in self.what_to_change.advice()},
+             'What these data cannot determine': self.undetermined})
 
 
 def identify(husky: Husky, recordings: Recordings, free: Iterable[str] = (), *,

@@ -6,12 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 import json
 import math
 import os
 from pathlib import Path
 import tempfile
 
+from lg_husky_sim.comparison.outcome import RANKED
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.traces import error_table, Predicted, traces_of
 from lg_husky_sim.errors import SettingsError
@@ -22,6 +24,7 @@ from lg_husky_sim.identification.result import Estimated, FitResult
 from lg_husky_sim.identification.start_states import HEAD, summary
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.reporting.data import (
+    Advice,
     BEFORE,
     ErrorRow,
     ErrorTable,
@@ -33,7 +36,17 @@ from lg_husky_sim.reporting.data import (
 )
 from lg_husky_sim.reporting.page import page
 from lg_husky_sim.reporting.sections import Cell, Chart, Line, Section, Table, Tone
-from lg_husky_sim.reporting.words import number, plural, quantity_with_unit, SIGN
+from lg_husky_sim.reporting.words import (
+    capitalised,
+    change,
+    number,
+    plural,
+    QUANTITIES,
+    quantity,
+    quantity_with_unit,
+    SIGN,
+    with_unit,
+)
 from lg_husky_sim.reporting.write import drawn, view_of
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -87,7 +100,8 @@ def files_together(paths: Sequence[Path]) -> Iterator[Mapping[Path, Path]]:
 
 
 def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile, out: Path,
-              provenance: Provenance | None = None) -> tuple[Path, ...]:
+              provenance: Provenance | None = None, advice: Sequence[Advice] = (),
+              ) -> tuple[Path, ...]:
     """
     Write a fit, all files or none.
 
@@ -101,6 +115,8 @@ def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile,
     out : pathlib.Path
         Model file; the report's files stand beside it.
     provenance : Provenance, optional
+    advice : sequence of Advice
+        What to change, from what still differs from the fitted model.
 
     Returns
     -------
@@ -120,7 +136,8 @@ def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile,
         data.write_text(json.dumps(result.data(), indent=1, ensure_ascii=False,
                                    allow_nan=False) + '\n',
                         encoding='utf-8')
-        report = report_data(result, segments, before, provenance)
+        report = replace(report_data(result, segments, before, provenance),
+                         advice=(*_load(out), *advice))
         images, captions, failures = drawn(report)
         html.write_text(page(report, view_of(report), images, captions, failures),
                         encoding='utf-8', errors='replace')
@@ -181,10 +198,27 @@ def _headline(result: FitResult, table: ErrorTable) -> Headline:
         return Headline(f'Not converged: {count} of {plural(len(result.recordings), "recording")}',
                         Tone.BAD, _facts(result, bound), (), tuple(warnings))
     return Headline(f'{count} estimated from {plural(len(result.recordings), "recording")}',
-                    Tone.BAD if bound else Tone.GOOD, _facts(result, bound),
-                    ('Load the model with `ros2 run lg_husky_sim sim_node --ros-args -p '
-                     'model:=FILE.yaml`, or give it to `simulate`, `compare` and `diagnose`.',),
-                    tuple(warnings))
+                    Tone.BAD if bound else Tone.GOOD, (*_gain(table), *_facts(result, bound)),
+                    (), tuple(warnings))
+
+
+def _load(out: Path) -> tuple[Advice, ...]:
+    return (Advice('The fitted model', (
+        f'Load it: `ros2 run lg_husky_sim sim_node --ros-args -p model:={out.name}`.',
+        f'Or give it to the other verbs, such as `lg_husky diagnose REC --model {out.name}`.')),)
+
+
+def _gain(table: ErrorTable) -> tuple[tuple[str, str], ...]:
+    # The most telling error there is, before and after.
+    rows = {row.name: row.values for row in table.rows}
+    for key in RANKED:
+        values = rows.get(quantity_with_unit(key), {})
+        before, after = (values.get(name, math.nan) for name in (BEFORE, FITTED))
+        if math.isfinite(before) and math.isfinite(after):
+            unit = QUANTITIES[key][1]
+            return ((f'{capitalised(quantity(key))} error', f'{number(before)} → '
+                     f'{with_unit(after, unit)} ({change(before, after)})'),)
+    return ()
 
 
 def _facts(result: FitResult, bound: int) -> tuple[tuple[str, str], ...]:

@@ -115,8 +115,8 @@ def test_the_answer_and_what_to_change_come_before_pictures_and_numbers(folder: 
         encoding='utf-8'))['findings'][0]['statement']
     places = [page.index(words) for words in (
         'Missing effect found: dry scrub of the tyres', html.escape(statement),
-        '<dt>Confidence</dt>', '<h2>What to change</h2>', '<figure', '<table>', '<h2>Competing effects</h2>',
-        '<h2>Notes</h2>', '<footer>')]
+        '<dt>Confidence</dt>', '<h2>What to change</h2>', '<figure', '<table>',
+        '<h2>Competing effects</h2>', '<h2>Notes</h2>', '<footer>')]
     assert places == sorted(places)
     for column in ('nominal', 'recalibrated', 'with finding'):
         assert f'<th>{column}</th>' in page
