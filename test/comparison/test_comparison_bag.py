@@ -91,3 +91,21 @@ def test_stamps_of_a_trajectory_keep_their_nanoseconds(
     for line, time in zip(lines, recording.stream('pose').times, strict=True):
         seconds, nanoseconds = line.split()[0].split('.')
         assert int(seconds) * 10**9 + int(nanoseconds) == recording.start_ns + round(time * 1e9)
+
+
+def test_evo_reads_the_trajectories_and_agrees_on_the_error(
+        comparison: lg.Comparison, tmp_path: Path) -> None:
+    pytest.importorskip('evo', reason='NO EVO: pip install evo, and what reads our trajectories '
+                                      'is tested')
+    from evo.core import metrics, sync
+    from evo.tools.file_interface import read_tum_trajectory_file
+
+    measured, *models = comparison.save_trajectories(tmp_path)
+    for path, label in zip(models, comparison.labels, strict=True):
+        reference = read_tum_trajectory_file(measured)
+        assert reference.check()[0]
+        error = metrics.APE(metrics.PoseRelation.translation_part)
+        error.process_data(sync.associate_trajectories(
+            reference, read_tum_trajectory_file(path)))
+        ours = comparison.outcomes[0].errors(label)['position'].rmse
+        assert error.get_statistic(metrics.StatisticsType.rmse) == pytest.approx(ours, rel=1e-5)
