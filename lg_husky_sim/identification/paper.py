@@ -10,7 +10,7 @@ from functools import cache
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.resources import config_path
-import yaml
+from lg_husky_sim.yaml_files import read_yaml
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class Paper:
         By the parameter's name.
     tracking_error : mapping of str to tuple of float
         Largest absolute errors in x and y [m] by manoeuvre.
+    population_search : mapping of str to float
+        What the paper leaves open, by name.
     """
 
     population: int
@@ -53,6 +55,7 @@ class Paper:
     crossover_fraction: float
     search: Mapping[str, SearchRange]
     tracking_error: Mapping[str, tuple[float, float]]
+    population_search: Mapping[str, float]
 
 
 @cache
@@ -66,8 +69,8 @@ def paper() -> Paper:
         If the file is of another schema.
     """
     path = config_path('paper.yaml')
-    data = yaml.safe_load(path.read_text(encoding='utf-8'))
-    if not isinstance(data, dict) or data.get('schema') != 'lg_husky_sim/paper/1':
+    data = read_yaml(path, SettingsError)
+    if data.get('schema') != 'lg_husky_sim/paper/1':
         raise SettingsError(f'{path}: schema is not lg_husky_sim/paper/1')
     genetic = data['genetic_algorithm']
     return Paper(
@@ -77,4 +80,5 @@ def paper() -> Paper:
                            float(entry['result']), str(entry['unit']))
          for name, entry in data['search'].items()},
         {name: (float(entry['x']), float(entry['y']))
-         for name, entry in data['tracking_error'].items()})
+         for name, entry in data['tracking_error'].items()},
+        {name: float(entry['value']) for name, entry in data['population_search'].items()})

@@ -19,12 +19,6 @@ import numpy as np
 Objective = Callable[[FloatArray], FloatArray]
 #: Called after each generation with its number and the best cost so far.
 Progress = Callable[[int, float], None]
-#: Share of a generation that survives unchanged (MATLAB's default for ``ga``).
-ELITE = 0.05
-#: Population of differential evolution, a free parameter.
-DE_POPULATION = 15
-#: Spread of the costs at which differential evolution has converged, relative to their mean.
-DE_TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +70,9 @@ def genetic(objective: Objective, lower: FloatArray, upper: FloatArray, seed: in
     """
     Search as the paper does: a genetic algorithm as MATLAB's ``ga`` runs it.
 
-    The best candidates so far make up 5 % of each generation; of the rest, the crossover
-    fraction are children of two parents by scattered crossover and the others Gaussian mutants
-    of one, whose standard deviation shrinks linearly to zero. Parents are the winners of
+    The best candidates so far, the elite, make up a share of each generation; of the rest, the
+    crossover fraction are children of two parents by scattered crossover and the others Gaussian
+    mutants of one, whose standard deviation shrinks linearly to zero. Parents are the winners of
     tournaments of two, which in expectation is linear ranking. All of these are DEAP's operators.
 
     Parameters
@@ -111,7 +105,7 @@ def genetic(objective: Objective, lower: FloatArray, upper: FloatArray, seed: in
     size = population or paper().population
     count = generations or paper().generations
     fraction = paper().crossover_fraction if crossover_fraction is None else crossover_fraction
-    elite = max(1, round(ELITE * size))
+    elite = max(1, round(paper().population_search['elite'] * size))
     crossed = round(fraction * (size - elite))
     box = _toolbox(objective, lower, upper)
     best_so_far, logbook = tools.HallOfFame(elite), tools.Logbook()
@@ -153,12 +147,13 @@ def _toolbox(objective: Objective, lower: FloatArray, upper: FloatArray) -> Any:
             one.fitness = -value
         return candidates
 
+    numbers = paper().population_search
     box = base.Toolbox()
     box.register('draw', draw)
     box.register('clone', _Candidate)
     box.register('evaluate', evaluate)
-    box.register('select', tools.selTournament, tournsize=2)
-    box.register('mate', tools.cxUniform, indpb=0.5)
+    box.register('select', tools.selTournament, tournsize=round(numbers['tournament']))
+    box.register('mate', tools.cxUniform, indpb=numbers['exchanged'])
     box.register('mutate', tools.mutGaussian, mu=[0.0] * lower.size, indpb=1.0)
     return box
 
@@ -171,7 +166,7 @@ def _mean(costs: Iterable[float]) -> float:
 
 def differential_evolution(objective: Objective, lower: FloatArray, upper: FloatArray,
                            seed: int, progress: Progress | None = None,
-                           generations: int = 300) -> SearchResult:
+                           generations: int | None = None) -> SearchResult:
     """
     Search by differential evolution (SciPy's, all candidates of a generation at once).
 
@@ -183,8 +178,8 @@ def differential_evolution(objective: Objective, lower: FloatArray, upper: Float
     seed : int
         The same seed gives the same result to the last bit.
     progress : callable, optional
-    generations : int
-        At most.
+    generations : int, optional
+        At most; as in ``config/paper.yaml`` if not given.
 
     Returns
     -------
@@ -192,6 +187,7 @@ def differential_evolution(objective: Objective, lower: FloatArray, upper: Float
     """
     from scipy import optimize
 
+    numbers = paper().population_search
     best: list[float] = []
     mean: list[float] = []
     evaluated = 0
@@ -208,9 +204,10 @@ def differential_evolution(objective: Objective, lower: FloatArray, upper: Float
         return costs
 
     found = optimize.differential_evolution(
-        batch, list(zip(lower, upper, strict=True)), seed=seed, maxiter=generations,
-        popsize=DE_POPULATION, tol=DE_TOLERANCE, polish=False, vectorized=True,
-        updating='deferred', init='sobol')
+        batch, list(zip(lower, upper, strict=True)), seed=seed,
+        maxiter=generations or round(numbers['evolution_generations']),
+        popsize=round(numbers['evolution_population']), tol=numbers['evolution_tolerance'],
+        polish=False, vectorized=True, updating='deferred', init='sobol')
     return SearchResult(np.asarray(found.x, dtype=np.float64), float(found.fun), np.array(best),
                         np.array(mean), evaluated, bool(found.success),
                         str(found.message))

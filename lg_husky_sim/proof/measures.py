@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import math
 
+from lg_husky_sim.proof.settings import settings
 import numpy as np
 from numpy.typing import NDArray
 
@@ -109,20 +110,19 @@ def share(plain: float, augmented: float, truth: float, least: float = 0.1) -> f
     return (plain - augmented) / achievable if math.isfinite(augmented) else -1.0
 
 
-def wilson(hits: float, count: int, z: float = 1.96) -> tuple[float, float]:
+def wilson(hits: float, count: int) -> tuple[float, float]:
     """
-    Return Wilson's interval of a proportion (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927).
+    Return Wilson's 95 % interval of a proportion (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927).
 
     Parameters
     ----------
     hits, count
         Successes among trials; no trial gives (0, 1).
-    z
-        Normal quantile; 1.96 for 95 %.
 
     """
     if count == 0:
         return 0.0, 1.0
+    z = float(settings()['intervals']['normal_quantile']['value'])
     p = hits / count
     centre = (p + z * z / (2 * count)) / (1 + z * z / count)
     half = z / (1 + z * z / count) * math.sqrt(p * (1 - p) / count + z * z / (4 * count ** 2))
