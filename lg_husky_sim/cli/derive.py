@@ -17,9 +17,9 @@ PAPER = ('simplified', 'expanded')
 
 
 @click.command(short_help='Derive the state-space model of a linear graph; draw and export it.')
-@click.option('--model', default='simplified', show_default=True,
-              metavar='simplified|expanded|FILE.yaml', type=Words(lambda: PAPER, files=True),
-              help="One of the paper's two graphs of the Husky, a netlist, or a model file.")
+@click.argument('graph', required=False, metavar='[GRAPH]', type=Words(lambda: PAPER, files=True))
+@click.option('--model', metavar='GRAPH', type=Words(lambda: PAPER, files=True),
+              help='The same as the argument, as other verbs have it.')
 @click.option('--output', 'outputs', multiple=True, metavar='VARIABLE',
               help="An output variable, such as 'i(L_1)'; may be given several times.")
 @click.option('--parameters', 'by_parameter', is_flag=True,
@@ -32,10 +32,14 @@ PAPER = ('simplified', 'expanded')
               help='Write numeric A, B, C and D: .json, .mat, .npz, .h (C), .tex or .py '
                    '(python-control, scipy); may be given several times.')
 @spoken()
-def command(model: str, outputs: tuple[str, ...], by_parameter: bool, latex: bool,
-            picture: Path | None, exports: tuple[Path, ...], say: Output) -> None:
+def command(graph: str | None, model: str | None, outputs: tuple[str, ...],
+            by_parameter: bool, latex: bool, picture: Path | None,
+            exports: tuple[Path, ...], say: Output) -> None:
     """
     Derive the state-space model of a linear graph and show every step.
+
+    GRAPH is a netlist, a model file or one of the paper's two graphs of the Husky, simplified
+    (the default) or expanded.
 
     Normal tree, continuity, compatibility and constitutive equations, then A, B, C and D (E and F
     if an input is differentiated, G, H and K if laws are not linear), and, given numbers, numeric
@@ -47,13 +51,16 @@ def command(model: str, outputs: tuple[str, ...], by_parameter: bool, latex: boo
 
     for path in exports:
         check_export(path)
-    graph = _load(model, outputs)
-    text = graph.latex(by_parameter) if latex else graph.text(by_parameter)
+    if graph and model:
+        message = f'{graph} and --model {model} are given; one graph is derived at a time'
+        raise click.UsageError(message)
+    derived = _load(graph or model or PAPER[0], outputs)
+    text = derived.latex(by_parameter) if latex else derived.text(by_parameter)
     if picture is not None:
-        graph.draw(picture)
+        derived.draw(picture)
     for path in exports:
-        graph.export(path)
-    data = json.loads(json_text(graph.numeric(), graph.name, graph.values)) if (
+        derived.export(path)
+    data = json.loads(json_text(derived.numeric(), derived.name, derived.values)) if (
         say.as_json) else None
     say.result(text, data)
     for path in (*([picture] if picture else []), *exports):

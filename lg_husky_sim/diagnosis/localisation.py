@@ -246,7 +246,7 @@ def where_it_shows(evidence: Evidence, gain: FloatArray) -> str:
     """
     total = float(np.sum(gain))
     if total <= 0.0:
-        return 'everywhere alike'
+        return 'everywhere'
     sums, counts, place = dict.fromkeys(WORDS, 0.0), dict.fromkeys(WORDS, 0), 0
     for whitener in evidence.whiteners:
         frame = whitener.frame
@@ -259,7 +259,7 @@ def where_it_shows(evidence: Evidence, gain: FloatArray) -> str:
     rows = sorted(((sums[n] / counts[n], WORDS[n]) for n in WORDS if counts[n] > 20
                    and sums[n] > 0.15 * total and sums[n] / counts[n] > 1.3 * mean),
                   reverse=True)
-    return ' and '.join(word for _, word in rows[:2]) or 'everywhere alike'
+    return ' and '.join(word for _, word in rows[:2]) or 'everywhere'
 
 
 def strengths(efforts: Sequence[Missing]) -> dict[str, float]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from lg_husky_sim.comparison.traces import Predicted, traces_of
 from lg_husky_sim.evaluation.engine import engine_config
-from lg_husky_sim.evaluation.paper_case import CaseResult, GENETIC, NOMINAL, SQUARES
+from lg_husky_sim.evaluation.paper_case import BASE, CaseResult, GENETIC, NOMINAL, SQUARES
 from lg_husky_sim.identification.paper import paper
 from lg_husky_sim.identification.report import convergence_chart
 from lg_husky_sim.reporting.data import ErrorRow, ErrorTable, Headline, ReportData
@@ -21,6 +21,12 @@ from lg_husky_sim.reporting.sections import Chart, Drawing, Section, Table
 PRINTED = 'printed in the paper'
 #: Numbers of the paper's figures of trajectories, in the order of its manoeuvres.
 FIRST_TRAJECTORY = 14
+#: What the models of a case are, by label.
+ABOUT = {
+    GENETIC: "the paper's linear graph (LG), calibrated by its genetic algorithm",
+    SQUARES: 'the same graph, calibrated by least squares',
+    BASE: 'the graph with a wheel-speed loop and dead time, calibrated by least squares',
+    NOMINAL: 'the graph with the numbers that the paper prints'}
 
 
 def table(result: CaseResult) -> Table:

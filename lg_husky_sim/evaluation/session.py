@@ -150,17 +150,22 @@ def report_data(request: Request, results: Sequence[CaseResult], steps: Sequence
     """
     columns = tuple(dict.fromkeys(label for result in results for label in result.labels))
     said = [line for result in results for line in case_report.verdict(result)[:1]]
-    closest = [name if len(results) == 1 else f'{result.case.name}: {name}' for result in results
+    closest = [name if len(results) == 1 else f'{name} ({result.case.name})' for result in results
                if (name := case_report.closest(result))]
     assessed = [*((result.case.name, result.what_to_change) for result in results),
                 *((result.recording, result.what_to_change) for result in steps)]
-    facts = (('Cases', ', '.join(result.case.name for result in results) or 'none'),
-             ('Recordings of steps', str(len(steps))), ('Seed', str(request.seed)))
+    facts = [('Cases', ', '.join(result.case.name for result in results) or 'none'),
+             ('Seed', str(request.seed))]
+    if steps:
+        facts.append(('Recordings of steps', str(len(steps))))
     return ReportData(
         "The paper's evaluation, redone",
         Headline('Closest on held-out drives: ' + '; '.join(closest) if closest
-                 else "The paper's evaluation, redone", facts=facts, sentences=tuple(said)),
-        columns, traces=tuple(trace for result in results for trace in traces_of(
+                 else "The paper's evaluation, redone", facts=tuple(facts),
+                 sentences=tuple(said)),
+        columns, tuple((name, case_report.ABOUT[name]) for name in columns
+                       if name in case_report.ABOUT),
+        traces=tuple(trace for result in results for trace in traces_of(
             case_report.parts_of(result), columns)),
         errors=(*map(case_report.papers_numbers, results), *(
             replace(table, folded=True) for result in results for table in recording_tables(

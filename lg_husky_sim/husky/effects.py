@@ -362,7 +362,8 @@ def effect_kind(name: str) -> EffectKind:
     """
     known = {**catalogue(), **descriptions()}
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f'; did you mean {near[0]}?' if near else ''
+        near = difflib.get_close_matches(name, known, n=1) or [
+            one for one, kind in known.items() if name and (name in one or name in kind.name)]
+        hint = f'; did you mean {" or ".join(near)}?' if near else ''
         raise ParameterError(f'unknown effect {shown(name)}{hint} (known: {", ".join(known)})')
     return known[name]

@@ -106,7 +106,8 @@ def _check_grounding(graph: LinearGraph) -> None:
             if reached.find(edge.tail) != reached.find(ground):
                 part = [e.name for e in edges if reached.find(e.tail) == reached.find(edge.tail)]
                 raise GraphError(
-                    f'node {edge.tail[1]!r} floats: {", ".join(part[:6])} have no way to the '
+                    f'node {edge.tail[1]!r} floats: {", ".join(part[:6])} '
+                    f'{"has" if len(part) == 1 else "have"} no way to the '
                     f'{domain.value} ground {ground[1]!r}; connect one of them to it')
 
 

@@ -138,6 +138,8 @@
     const layout = base(narrow() ? 430 + 18 * data.columns.length : 560), lines = [];
     layout.xaxis = axis({ title: { text: 'x [m]' } });
     layout.yaxis = axis({ title: { text: 'y [m]' }, scaleanchor: 'x', scaleratio: 1 });
+    // Many names reach below the buttons at the right, and get a line of their own.
+    if (data.columns.length > 3 && !narrow()) layout.margin.t = 52;
     layout.hovermode = 'closest';
     x.p.forEach((values, column) => {
       if (values && y.p[column]) lines.push({ x: values, y: y.p[column], type: 'scatter',

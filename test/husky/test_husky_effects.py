@@ -81,6 +81,10 @@ def test_ids_and_subsystems() -> None:
 
 
 def test_unknown_ids_sides_and_shapes_are_refused() -> None:
+    for part, whole in (('coulomb', 'coulomb_drivetrain or yaw_scrub_coulomb'),
+                        ('dead band', 'driver_deadband')):
+        with pytest.raises(ParameterError, match=f'did you mean {whole}[?]'):
+            Effect(part)
     with pytest.raises(ParameterError, match=r'unknown effect .*did you mean payload'):
         Effect('paylod')
     with pytest.raises(ParameterError, match=r'side .*both.* of effect encoder_scale'):
