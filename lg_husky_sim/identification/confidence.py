@@ -15,20 +15,11 @@ from dataclasses import dataclass
 import itertools
 
 from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
-#: Length of a block [s].
-BLOCK = 2.0
-#: Probability of an interval.
-LEVEL = 0.95
-#: Correlation from which two parameters are said to be known only together.
-TOGETHER = 0.9
-#: Relative half width of an interval from which a parameter counts as poorly determined.
-WIDE = 0.3
-#: Least gain in relative accuracy of a ratio or product over its parts to be worth saying.
-GAIN = 3.0
 #: Share of the largest eigenvalue of the curvature below which a direction counts as untouched by
 #: the data: a million times less certain than the best one.
 FLAT = 1e-12
@@ -89,7 +80,7 @@ def _block_sums(problem: Problem, slope: FloatArray, white: FloatArray) -> Float
         part = slice(one.first, one.last)
         start = observations.segments[one.segment].start
         number[part] = one.segment * 1_000_000 + (
-            (observations.times[part] - start) / BLOCK).astype(np.int64)
+            (observations.times[part] - start) / setting('block')).astype(np.int64)
     _, place = np.unique(number, return_inverse=True)
     scores = np.zeros((int(place.max(initial=0)) + 1, slope.shape[1]))
     np.add.at(scores, place, slope * white[:, None])
@@ -135,8 +126,8 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     plain = bread * level
     sandwich = bread @ meat @ bread
     # The scatter of few blocks is itself uncertain: Student's t widens it, and only it.
-    normal = float(ndtri(0.5 + 0.5 * LEVEL))
-    student = float(stdtrit(max(blocks - count, 1), 0.5 + 0.5 * LEVEL))
+    normal = float(ndtri(0.5 + 0.5 * setting('interval_level')))
+    student = float(stdtrit(max(blocks - count, 1), 0.5 + 0.5 * setting('interval_level')))
     variances = np.maximum(np.diag(sandwich) * (student / normal) ** 2, np.diag(plain))
     lift = np.sqrt(variances / np.maximum(np.diag(plain), 1e-300))
     covariance = plain * np.outer(lift, lift)
@@ -187,20 +178,20 @@ def undetermined(result: Confidence, values: FloatArray) -> tuple[str, ...]:
     """
     said: list[str] = []
     deviations = result.deviations
-    reach = float(ndtri(0.5 + 0.5 * LEVEL))
+    reach = float(ndtri(0.5 + 0.5 * setting('interval_level')))
     names = [u.name for u in result.unknowns]
     relative = [_relative(n, u, float(d), float(v)) for n, u, d, v in zip(
         names, result.unknowns, deviations, values, strict=True)]
     for i, j in itertools.combinations(range(len(names)), 2):
         both = result.unknowns[i].logarithmic and result.unknowns[j].logarithmic
         correlation = float(result.correlation[i, j])
-        if not both or abs(correlation) < TOGETHER:
+        if not both or abs(correlation) < setting('known_together'):
             continue
         sign = 1.0 if correlation > 0.0 else -1.0
         variance = (result.covariance[i, i] + result.covariance[j, j]
                     - 2.0 * sign * result.covariance[i, j])
         joint = float(np.sqrt(max(variance, 0.0)))
-        if joint * GAIN > min(relative[i], relative[j]):
+        if joint * setting('combination_gain') > min(relative[i], relative[j]):
             continue
         # The less certain one over the other reads as B_H/B.
         first, second = names[j], names[i]
@@ -213,7 +204,7 @@ def undetermined(result: Confidence, values: FloatArray) -> tuple[str, ...]:
             f'{separators((names[i], names[j]))}')
     covered = ' '.join(said)
     for place, (name, spread) in enumerate(zip(names, relative, strict=True)):
-        if reach * spread > WIDE and name not in covered:
+        if reach * spread > setting('poorly_determined') and name not in covered:
             said.append(f'{name} is hardly determined by these data: '
                         f'{result.low[place]:.3g} to {result.high[place]:.3g}')
     return tuple(said)

@@ -31,6 +31,7 @@ from lg_husky_sim.identification.search import (
     Objective,
     SearchResult,
 )
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.identification.start_states import (
     settle_of,
     start_states,
@@ -49,10 +50,6 @@ import numpy as np
 
 #: Starts of the multi-start least squares, the given model's values being the first.
 STARTS = 6
-#: Difference in cost within which two ends fit the data equally well [nats].
-EQUAL = 2.0
-#: Distance of two ends, in standard deviations, from which they disagree.
-APART = 3.0
 
 
 def estimate(model: ModelFile, segments: Sequence[Segment], *,
@@ -271,13 +268,13 @@ def _left_over(problem: Problem, solution: Solution) -> list[str]:
 def _disagreement(ends: Ends, sure: Confidence) -> list[str]:
     said = []
     best = min(end.cost for end in ends.all)
-    worse = [end for end in ends.all if end.cost > best + EQUAL]
-    equal = [end for end in ends.all if end.cost <= best + EQUAL]
+    worse = [end for end in ends.all if end.cost > best + setting('equal_fit')]
+    equal = [end for end in ends.all if end.cost <= best + setting('equal_fit')]
     spread = np.maximum(sure.deviations, 1e-12)
     apart: set[str] = set()
     for unknown, deviation in zip(sure.unknowns, spread, strict=True):
         varied = [unknown.varied(end.values[unknown.name]) for end in equal]
-        if max(varied) - min(varied) > APART * deviation:
+        if max(varied) - min(varied) > setting('starts_apart') * deviation:
             apart.add(unknown.name)
     if apart:
         said.append(f'starting points disagree: {len(equal)} optima fit equally well but differ '

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import BodyTwist, FloatArray, TimeSeries
 from lg_husky_sim.simulation import starting
@@ -28,8 +29,6 @@ SETTLE = 0.6
 #: The same where the initial state is estimated [s]: what late stamps and the windows of the
 #: sensors reach back.
 SETTLE_ESTIMATED = EARLY
-#: Highest rate that a channel is used at [1/s]; faster ones are thinned.
-FASTEST = 55.0
 #: Channels in the order of the measurement vector.
 CHANNELS = ('wheel_left', 'wheel_right', 'yaw_rate', 'advance', 'turn')
 #: Corrections of the state at the start of a segment: of the base's forward speed [m/s] and yaw
@@ -139,8 +138,8 @@ def _thinned(times: FloatArray) -> slice:
     if times.size < 3:
         return slice(None)
     step = float(np.median(np.diff(times)))
-    return slice(None, None, max(1, math.ceil(1.0 / (step * FASTEST)))) if step > 0.0 else (
-        slice(None))
+    most = setting('fastest_rate')
+    return slice(None, None, max(1, math.ceil(1.0 / (step * most)))) if step > 0.0 else slice(None)
 
 
 def _increments(pose: TimeSeries, start: float) -> tuple[Channel, ...]:

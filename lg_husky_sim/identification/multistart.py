@@ -13,6 +13,7 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.least_squares import Problem, Solution, solve, Unknown
 from lg_husky_sim.identification.noise import Metric, metric, scales
 from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.identification.unknowns import starts_of
 from lg_husky_sim.parallel import run_tasks
 from lg_husky_sim.signals import FloatArray
@@ -24,13 +25,6 @@ STEPS = 40
 TOLERANCE = 1e-3
 #: Passes over the noise: scales and correlation from the fit before.
 PASSES = 2
-#: Correlation from one value to the next above which a residual is taken for an error of the
-#: model, which is not whitened away; below it, for noise of a sensor, which is.
-AUTOCORRELATED = 0.3
-#: Mean square of a standardised residual below which there is nothing left to explain.
-NOTHING = 0.1
-#: Standardised residual from which a value loses weight (Huber's loss).
-OUTLIER = 4.0
 
 
 class CountedProblem(Problem):
@@ -170,7 +164,8 @@ def noise_metric(data: Observations, residual: FloatArray, predicted: FloatArray
     scale = scales(data, residual, predicted)
     plain = metric(data, residual, scale, order=0)
     standard = np.abs(plain.whiten(data, residual))
-    weight = np.where(standard > OUTLIER, OUTLIER / np.maximum(standard, OUTLIER), 1.0)
+    most = setting('outlier')
+    weight = np.where(standard > most, most / np.maximum(standard, most), 1.0)
     scale = scale * np.sqrt(weight)
     plain = metric(data, residual, scale, order=0)
     white = metric(data, residual, scale)
@@ -199,7 +194,7 @@ def is_autocorrelated(data: Observations, scaled: FloatArray, name: str) -> bool
             below += float(part @ part)
             count += part.size
     # What is far below the least noise that is believed is rounding, whatever its shape.
-    return above > AUTOCORRELATED * below and below > NOTHING * count
+    return above > setting('model_error') * below and below > setting('nothing_left') * count
 
 
 def refine(data: Observations, model: ModelFile, unknowns: Sequence[Unknown],

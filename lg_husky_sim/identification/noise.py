@@ -17,24 +17,16 @@ from typing import Any
 
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.identification.relations import apart, coefficients
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-#: Uncertainty of a stamp [s].
-STAMP = 0.004
 #: Order of the autoregression.
 ORDER = 8
 #: Smallest noise that is believed [unit of each channel]: below it a channel is taken as exact.
 LEAST = {'wheel_left': 0.004, 'wheel_right': 0.004, 'yaw_rate': 0.001, 'advance': 0.002,
          'turn': 0.001}
-#: Root mean square of normal values without the largest tenth.
-TRIMMED = 0.789
-#: Share of differences below a tenth of a deviation from which values move in steps: 0.08 if
-#: they were normal.
-STILL = 0.3
-#: A pose increment further off than this many robust deviations is a jump of the localisation.
-JUMP = 9.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,9 +198,9 @@ def stepwise(values: FloatArray) -> float:
     inner = sizes[:int(0.9 * sizes.size)]
     if not inner.size:
         return 0.0
-    size = float(np.sqrt(np.mean(inner ** 2))) / TRIMMED
+    size = float(np.sqrt(np.mean(inner ** 2))) / setting('trimmed_size')
     near = float(np.mean(np.abs(values) < 0.1 * size))
-    return size if near > STILL else 0.0
+    return size if near > setting('stepped_share') else 0.0
 
 
 def scales(observations: Observations, residual: FloatArray, predicted: FloatArray
@@ -240,9 +232,10 @@ def scales(observations: Observations, residual: FloatArray, predicted: FloatArr
             slope = np.abs(np.gradient(predicted[part], np.maximum(times, times[0])
                                        + 1e-9 * np.arange(times.size)))
             slope = np.maximum(slope, np.maximum(np.roll(slope, 1), np.roll(slope, -1)))
-            scale[part] = 1.0 / np.sqrt(level ** 2 + (slope * STAMP) ** 2)
+            scale[part] = 1.0 / np.sqrt(level ** 2 + (slope * setting('stamp_uncertainty')) ** 2)
             if name in ('advance', 'turn'):
-                off = np.abs(residual[part] - np.median(whole)) > JUMP * max(wide, level)
+                far = setting('pose_jump') * max(wide, level)
+                off = np.abs(residual[part] - np.median(whole)) > far
                 scale[part][off] = 0.0
     return scale
 

@@ -9,16 +9,13 @@ from dataclasses import dataclass, replace
 
 from lg_husky_sim.errors import FitError
 from lg_husky_sim.identification.least_squares import Problem, Solution, solve
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy.special import chdtri
 
 #: Rise of the cost at the ends of a 95 % interval [nats].
 LEVEL = 0.5 * float(chdtri(1, 0.05))
-#: Values of the held parameter on either side of the estimate.
-SIDE = 5
-#: Farthest value, in standard deviations.
-REACH = 3.0
 #: Most Jacobians for the others at each value.
 STEPS = 8
 
@@ -79,9 +76,10 @@ def profile(problem: Problem, solution: Solution, name: str, deviation: float,
     held = problem.unknowns[names.index(name)]
     others = [u for u in problem.unknowns if u.name != name]
     centre = held.varied(solution.values[name])
-    shifts = np.linspace(-REACH, REACH, 2 * SIDE + 1) * deviation
+    reach, count = setting('profile_reach'), round(setting('profile_values'))
+    shifts = np.linspace(-reach, reach, 2 * count + 1) * deviation
     values, costs = [], []
-    for side in (shifts[SIDE::-1], shifts[SIDE + 1:]):
+    for side in (shifts[count::-1], shifts[count + 1:]):
         start = dict(solution.values)
         for shift in side:
             value = held.value(centre + float(shift))

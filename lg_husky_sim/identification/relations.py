@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy import sparse
@@ -28,10 +29,6 @@ SOURCES: Mapping[str, Mapping[str, Sequence[tuple[str, float]]]] = {
     'turn': {'gyro': (('yaw_rate', 1.0),),
              'wheels_turn': (('wheel_right', 0.5), ('wheel_left', -0.5))},
 }
-#: Ridge on the coefficients, as a part of the source's own energy.
-RIDGE = 1e-3
-#: Deviations at which a value is clipped before the coefficients are estimated.
-CLIP = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,10 +183,10 @@ def coefficients(observations: Observations, residual: FloatArray, scale: FloatA
         target = residual[mask] * weight
         columns = np.column_stack([(link.operator @ residual)[mask] * weight for link in own])
         wide = 1.4826 * float(np.median(np.abs(target))) + 1e-9
-        kept = np.minimum(1.0, CLIP * wide / np.maximum(np.abs(target), 1e-12))
+        kept = np.minimum(1.0, setting('clip') * wide / np.maximum(np.abs(target), 1e-12))
         target, columns = target * kept, columns * kept[:, None]
         gram = columns.T @ columns
-        gram += RIDGE * np.diag(np.diag(gram)) + 1e-9 * np.eye(len(own))
+        gram += setting('ridge') * np.diag(np.diag(gram)) + 1e-9 * np.eye(len(own))
         best = np.linalg.solve(gram, columns.T @ target)
         result[channel] = {link.source: float(b) for link, b in zip(own, best, strict=True)}
     return result

@@ -12,14 +12,13 @@ from typing import Any
 
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.profile import Profile
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.identification.start_states import HEAD, StartState, summary
 from lg_husky_sim.reporting.words import plural, quantity
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 SCHEMA = 'lg_husky_sim/fit/1'
-#: Correlations below this are not printed.
-SHOWN = 0.5
 
 
 class Method(enum.Enum):
@@ -180,9 +179,9 @@ class FitResult:
         lines += [f'{quantity(c.name):<{width}}  {c.count:>8}  {c.before:>11.4g}  '
                   f'{c.after:>11.4g}  {c.unit}' for c in self.channels]
         pairs = [(abs(self.correlation[i, j]), i, j) for i in range(len(self.estimates))
-                 for j in range(i) if abs(self.correlation[i, j]) >= SHOWN]
+                 for j in range(i) if abs(self.correlation[i, j]) >= setting('shown_correlation')]
         if pairs:
-            lines += ['', f'correlations of {SHOWN} and more '
+            lines += ['', f'correlations of {setting("shown_correlation")} and more '
                           f'(condition number {self.condition:.3g}):']
             lines += [f'  {self.estimates[j].name}, {self.estimates[i].name}: '
                       f'{self.correlation[i, j]:+.3f}' for _, i, j in sorted(pairs, reverse=True)]

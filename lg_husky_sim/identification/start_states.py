@@ -21,6 +21,7 @@ from lg_husky_sim.identification.fit_segments import (
 )
 from lg_husky_sim.identification.least_squares import Unknown
 from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.signals import BodyTwist, FloatArray
 from lg_husky_sim.simulation.simulator import Simulator
 import numpy as np
@@ -39,10 +40,6 @@ WIDTHS: dict[str, tuple[str, float, float, float, float]] = {
     'initial_left': ('rad/s', 40.0, 0.05, 1.0, 6.0),
     'initial_right': ('rad/s', 40.0, 0.05, 1.0, 6.0),
 }
-#: Share of the prior's width from which an interval is the prior's and not the data's.
-OPEN = 0.5
-#: Share of a deviation from which it is still remembered.
-REMEMBERED = 0.02
 
 
 @dataclass(frozen=True)
@@ -125,7 +122,7 @@ def remembered(plant: Plant, settle: float) -> tuple[int, ...]:
         forward, yaw, left, right = (float(place == k) for k in range(4))
         state = simulator.initial(twist=BodyTwist(forward, yaw), wheel_rates=(left, right))
         left_over: FloatArray = later @ state.flat[:state.n]
-        if float(np.max(np.abs(left_over))) > REMEMBERED:
+        if float(np.max(np.abs(left_over))) > setting('remembered'):
             kept.append(place)
     return tuple(kept)
 
@@ -201,7 +198,7 @@ def start_states(data: Observations, unknowns: Sequence[Unknown], values: Sequen
             unknown.name, quantity, segment.name, WIDTHS[quantity][0],
             segment.initial_state[place], value,
             value - reach * deviation, value + reach * deviation,
-            deviation < OPEN * unknown.deviation,
+            deviation < setting('prior_share') * unknown.deviation,
             abs(value) >= unknown.upper * (1.0 - 1e-9)))
     return tuple(found)
 

@@ -15,6 +15,7 @@ from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.least_squares import effect_unknown, Unknown
 from lg_husky_sim.identification.paper import paper
 from lg_husky_sim.identification.problem import Observations
+from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.identification.start_states import INITIAL_STATE, settle_of, start_unknowns
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -27,9 +28,6 @@ NUISANCES: dict[str, tuple[str, float, float, float]] = {
     'delay_pose': ('s', -0.5, 0.5, 0.01),
     'gyro_bias': ('rad/s', -0.5, 0.5, 0.002),
 }
-#: Prior on the logarithm of a free parameter: a factor of e to this power either way. So weak
-#: that it only keeps directions that the data leave open from running away.
-WEAK = 4.0
 #: Random starts lie within this factor of the given value: of one that nobody knows, such as a
 #: damping, and of one that is known to its tolerance.
 AROUND, NEAR = 6.0, 1.8
@@ -107,7 +105,8 @@ def unknowns_of(model: ModelFile, names: Sequence[str], nuisance: Sequence[str],
             size = max(abs(entry.value), abs(of_effects[name].starts[0]))
             found.append(effect_unknown(of_effects[name], size))
         elif entry.lower > 0.0:
-            found.append(Unknown(name, True, math.log(entry.value), WEAK, entry.lower,
+            found.append(Unknown(name, True, math.log(entry.value), setting('prior_deviation'),
+                                 entry.lower,
                                  entry.upper, 0.01))
         else:
             step = 0.01 * max(abs(entry.value), 1e-3)
