@@ -41,6 +41,8 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Lines of new terms up to which a page shows them without a click.
+MOST_TERMS = 10
 #: Factor of a law that is switched off: no Stribeck share.
 _ABSENT = re.compile(r'\(1\+\(0\.0\)\*exp\([^*]*\*\*2\)\)\*')
 #: Term of a law whose factor is zero.
@@ -159,10 +161,14 @@ def _where(case: Case) -> tuple[Section, ...]:
             for name, share in strengths(efforts).items()))]
         charts = _efforts(efforts, strengths(efforts))
     terms = new_terms(diagnosis.model, plain)
-    sections = [Section(
-        'Where in the model', text=('New terms in the equations:',) if terms else (),
-        verbatim='\n'.join(terms),
-        drawings=(Drawing('graph', caption, lambda: _graph_figure(plain, final, elements)),))]
+    drawing = Drawing('graph', caption, lambda: _graph_figure(plain, final, elements))
+    heading, text = 'New terms in the equations', '\n'.join(terms)
+    if len(terms) > MOST_TERMS:
+        sections = [Section('Where in the model', drawings=(drawing,)),
+                    Section(heading, verbatim=text, folded=True)]
+    else:
+        sections = [Section('Where in the model', text=(f'{heading}:',) if terms else (),
+                            verbatim=text, drawings=(drawing,))]
     if charts:
         sections.append(Section(
             'The missing effort', (

@@ -17,6 +17,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import Fit, Point
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.result import Estimate, Finding
 from lg_husky_sim.diagnosis.sensors.faults import Fault
+from lg_husky_sim.diagnosis.wording import in_words
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.network import on_side
 from scipy.special import ndtr
@@ -96,12 +97,14 @@ def fault_findings(found: Sequence[Fault], fit: Fit | None = None) -> tuple[Find
         if fault.effect is None or fault.number is None:
             continue
         numbers: tuple[Estimate, ...] = (fault.number,)
+        statement = f'{fault.statement}.'
         if fit is not None:
             numbers = estimates(fit, [fault.number.name], fit.point.numbers)
+            statement += f' The fit of the model gives {in_words(numbers)}.'
         kind = fault.effect.kind
         made.append(Finding(
             fault.effect.id, fault.effect.side, kind.subsystem.value,
             on_side(kind.elements, fault.effect.side), 'everywhere', None, numbers, gain,
             2.0 * float(ndtr(-fault.certainty)),
-            min(1.0, gain / total), (), f'{fault.statement}. {UNMODELLED}'))
+            min(1.0, gain / total), (), f'{statement} {UNMODELLED}'))
     return tuple(made)
