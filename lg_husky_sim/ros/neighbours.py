@@ -80,4 +80,4 @@ class Neighbours:
                     twin = ' (of the same name)' if other == own else ''
                     self._node.get_logger().warning(
                         f'{other}{twin} publishes {self._node.resolve_topic_name(topic)} as '
-                        'well: who listens gets both')
+                        'well: subscribers receive both')

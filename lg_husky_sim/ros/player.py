@@ -150,5 +150,5 @@ def _say_who(tool: Tool, commands: Commands, senders: Mapping[str, _Stream], tol
     for topic, others in _others(tool, senders).items():
         if others:
             known = [one.node for one in others if one.is_named]
-            say(f'{topic} is published by {known[0] if known else "another node"} as well: who '
-                'listens gets both')
+            say(f'{topic} is published by {known[0] if known else "another node"} as well: '
+                'subscribers receive both')

@@ -197,7 +197,7 @@ TABLE: tuple[Setting, ...] = (
     Setting('scan_rate', float, 'scans per simulated second; 0: as rate', 'Hz', 0.0, 1000.0),
     Setting('scan_x', float, "laser ahead of the base's origin", 'm', -10.0, 10.0),
     Setting('scan_y', float, "laser to the left of the base's origin", 'm', -10.0, 10.0),
-    Setting('scan_heading', float, 'heading of the laser from that of the base', 'rad', -10.0,
+    Setting('scan_heading', float, 'heading of the laser relative to the base', 'rad', -10.0,
             10.0),
     Setting('scan_angle_min', float, 'angle of the first ray', 'rad', -10.0, 10.0),
     Setting('scan_angle_max', float, 'no ray is at or beyond this angle', 'rad', -10.0, 10.0),

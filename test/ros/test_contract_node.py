@@ -153,7 +153,7 @@ def test_another_publisher_is_named_once(probe: Probe, made: list[SimNode]) -> N
     assert probe.until(lambda: said('/probe publishes'), 10.0)
     probe.spin(2.2)
     assert said('publishes') == ['/probe publishes /crowd/husky_velocity_controller/odom as well: '
-                                 'who listens gets both']
+                                 'subscribers receive both']
     assert said('in: ') == ['in: /crowd/husky_velocity_controller/cmd_vel, /crowd/initialpose '
                             '(Twist)']
     # common_interfaces has no tf2_msgs; what is not there is not announced.

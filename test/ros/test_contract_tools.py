@@ -348,7 +348,7 @@ def test_a_recording_of_nothing_is_an_error(probe: Probe, tmp_path: Path) -> Non
     probe.talk('std_msgs/msg/Bool', '/something_else')
     tool = Tool('lg_husky_recorder', Orderly())
     try:
-        with pytest.raises(RecordingError, match=r'nothing came .* /something_else'):
+        with pytest.raises(RecordingError, match=r'nothing was received on .* /something_else'):
             record(tool, tmp_path / 'bag', make_settings(
                 command_topic='n/a', odometry_topic='n/b', ground_truth_topic='n/c',
                 joint_states_topic='n/d', imu_topic='n/e', battery_topic='n/f'), seconds=0.4)

@@ -12,7 +12,7 @@ import pytest
 def test_a_node_that_does_not_come_up_in_time_is_ended(probe: Probe) -> None:
     """It would go on publishing into every test that comes after."""
     husky = LiveHusky(probe)
-    with pytest.raises(SettingsError, match='the node does not come up'):
+    with pytest.raises(SettingsError, match='the node did not start'):
         husky.ready([], timeout=0.2)
     assert husky.node.process.poll() is not None
 
