@@ -11,9 +11,13 @@ import os
 from pathlib import Path
 import signal
 import subprocess
+import time
 from typing import Any
 
 import pytest
+
+#: How long a program and all that it started may take to end [s].
+PATIENCE = 15.0
 
 
 def find_program(package: str, name: str) -> Path:
@@ -36,6 +40,31 @@ def program() -> Callable[[str, str], Path]:
     return find_program
 
 
+def members(group: int) -> list[int]:
+    """Return the processes of a group that still run; who is dead and not reaped does not."""
+    found = []
+    for stat in Path('/proc').glob('[0-9]*/stat'):
+        try:
+            # After the name, which may have spaces and brackets: state, parent, group.
+            state, _, of = stat.read_text().rpartition(')')[2].split()[:3]
+        except (FileNotFoundError, ProcessLookupError):
+            # It ended between the two.
+            continue
+        if int(of) == group and state != 'Z':
+            found.append(int(stat.parent.name))
+    return found
+
+
+def tell(group: int, number: int) -> None:
+    """Send a signal to each process of a group that still runs."""
+    for one in members(group):
+        try:
+            os.kill(one, number)
+        except ProcessLookupError:
+            # It ended meanwhile.
+            continue
+
+
 @pytest.fixture
 def run(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
     """Return a starter of programs that are ended with the test; what they said is printed."""
@@ -51,13 +80,14 @@ def run(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
 
     yield start
     for process, _ in reversed(running):
-        if process.poll() is None:
-            # To its children as well, as Ctrl-C in a terminal; `launch` leaves them to that.
-            os.killpg(process.pid, signal.SIGINT)
+        # To its children as well, as Ctrl-C in a terminal; `launch` leaves them to that. Also
+        # where the program itself is gone: what it had started may have outlived it.
+        tell(process.pid, signal.SIGINT)
     for process, log in running:
-        try:
-            process.wait(10.0)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-        print(f'--- {log.name}\n{log.read_text(errors="replace")[-4000:]}')
+        end = time.monotonic() + PATIENCE
+        while (late := members(process.pid)) and time.monotonic() < end:
+            time.sleep(0.05)
+        tell(process.pid, signal.SIGKILL)
+        process.wait()
+        print(f'--- {log.name}{", killed" if late else ""}\n'
+              f'{log.read_text(errors="replace")[-4000:]}')
