@@ -3,9 +3,11 @@
 """
 Run the contract tests and the ros2 command line on a real ROS 2, and write what they said.
 
-Usage, with ROS 2 sourced: ``python scripts/ros_verified.py [--embedded PYTHON] [--no-tests]``. The
-part of docs/ros_verified.md between its markers is made anew, for every RMW that is installed;
-PYTHON is an interpreter without ROS, for the embedded backend.
+Usage, with ROS 2 sourced:
+``python scripts/ros_verified.py [--embedded PYTHON] [--no-tests] [--no-stacks]``. The part of
+docs/ros_verified.md between its markers is made anew, for every RMW that is installed; PYTHON is
+an interpreter without ROS, for the embedded backend. The tests of other stacks print their
+figures, which are copied; of a stack that is not installed they say so.
 """
 
 from __future__ import annotations
@@ -28,12 +30,19 @@ PAGE = ROOT / 'docs' / 'ros_verified.md'
 MARKERS = '<!-- made by scripts/ros_verified.py -->', '<!-- end of what is made -->'
 RMWS = ('rmw_cyclonedds_cpp', 'rmw_fastrtps_cpp')
 PACKAGES = ('rclpy', 'rcl', *RMWS, 'cyclonedds', 'fastrtps', 'sensor_msgs', 'nav_msgs',
-            'simulation_interfaces', 'tf2_ros_py', 'robot_localization', 'rosbag2_py', 'ros2cli')
+            'simulation_interfaces', 'tf2_ros_py', 'rosbag2_py', 'ros2cli', 'rclcpp',
+            'robot_localization', 'robot_state_publisher', 'teleop_twist_keyboard', 'twist_mux',
+            'nav2_planner', 'nav2_navfn_planner', 'nav2_controller', 'nav2_costmap_2d',
+            'nav2_regulated_pure_pursuit_controller', 'nav2_behaviors', 'nav2_bt_navigator',
+            'behaviortree_cpp')
 WHEELS = ('numpy', 'numba', 'rosbags', 'cyclonedds', 'pytest')
-PYTEST = ('-m', 'pytest', 'test/ros', '-q', '-p', 'no:cacheprovider',
-          # ROS' own plugins do not know the newest pytest.
-          '-p', 'no:launch_testing', '-p', 'no:launch_ros',
-          '-p', 'no:launch_testing_ros_pytest_entrypoint')
+#: ROS' own plugins do not know the newest pytest.
+PLUGINS = ('-p', 'no:cacheprovider', '-p', 'no:launch_testing', '-p', 'no:launch_ros',
+           '-p', 'no:launch_testing_ros_pytest_entrypoint')
+PYTEST = ('-m', 'pytest', 'test/ros', '--ignore', 'test/ros/stacks', '-q', *PLUGINS)
+STACKS = ('-m', 'pytest', 'test/ros/stacks', '-s', '-q', '-rs', *PLUGINS)
+#: How a test begins a line that is to be copied.
+FIGURE = 'figure: '
 #: What is typed beside a node with services in a map; the last ones change it.
 COMMANDS = (
     'ros2 node list', 'ros2 topic list -t', 'ros2 topic info -v /scan',
@@ -76,14 +85,29 @@ def versions_table(packages: dict[str, str]) -> str:
                       *(f'| {name} | {text} |' for name, text in rows)])
 
 
+def said_by_pytest(python: str, words: tuple[str, ...], environment: dict[str, str]) -> list[str]:
+    """Return what pytest says."""
+    done = subprocess.run(  # noqa: S603
+        [python, *words], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    return done.stdout.strip().splitlines() or [f'no answer, exit code {done.returncode}']
+
+
 def tested(python: str, environment: dict[str, str]) -> tuple[str, list[str]]:
     """Return the last line of the contract tests, and which of them failed."""
-    ran = subprocess.run(  # noqa: S603
-        [python, *PYTEST], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
-    lines = ran.stdout.strip().splitlines() or [f'no answer, exit code {ran.returncode}']
+    lines = said_by_pytest(python, PYTEST, environment)
     failed = [re.sub(r' - .*', '', line) for line in lines
               if line.startswith(('FAILED', 'ERROR'))]
     return re.sub(r'^=+ | =+$', '', lines[-1]), failed
+
+
+def stack(rmw: str) -> str:
+    """Run the tests of other stacks; return their figures, what was left out and the result."""
+    lines = said_by_pytest(sys.executable, STACKS, os.environ | {'RMW_IMPLEMENTATION': rmw})
+    shown = [line.partition(FIGURE)[2] for line in lines if FIGURE in line]
+    shown += [re.sub(r' - .*', '', line) for line in lines
+              if line.startswith(('FAILED', 'ERROR', 'SKIPPED'))]
+    shown.append(re.sub(r'^=+ | =+$', '', lines[-1]))
+    return '\n'.join([f'{rmw}:', '', '```', *shown, '```'])
 
 
 def tests_table(rmws: list[str], embedded: str | None) -> str:
@@ -150,7 +174,8 @@ def main() -> int:
     """Run all that there is, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--embedded', help='an interpreter without ROS')
-    parser.add_argument('--no-tests', action='store_true', help='the command line only')
+    parser.add_argument('--no-tests', action='store_true', help='without the contract tests')
+    parser.add_argument('--no-stacks', action='store_true', help='without those of other stacks')
     words = parser.parse_args()
     packages = package_versions()
     rmws = [name for name in RMWS if name in packages]
@@ -163,6 +188,8 @@ def main() -> int:
     if not words.no_tests:
         parts += ['## Contract tests', f'    python {" ".join(PYTEST)}',
                   tests_table(rmws, words.embedded)]
+    if not words.no_stacks:
+        parts += ['## Other stacks', f'    python {" ".join(STACKS)}', *map(stack, rmws)]
     for place, rmw in enumerate(rmws):
         parts += [f'## The command line, {rmw}', session(rmw, 60 + place)]
     before, _, rest = PAGE.read_text(encoding='utf-8').partition(MARKERS[0])
