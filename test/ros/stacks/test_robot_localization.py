@@ -14,8 +14,10 @@ from lg_husky_sim.ros import api
 from lg_husky_sim.testing.live import LiveHusky, Probe
 import pytest
 
-#: Largest distance between the filter and the truth, as a share of the way driven.
-BOUND = 0.03
+#: Largest distance between the filter and the truth, as a share of the way driven. The wheels'
+#: speed along the true heading comes to 1.0, 1.2 and 1.8 %, so nothing is left for the filter to
+#: add; with the wheels' yaw rate instead of the IMU it is 3.5, 2.2 and 3.1 %.
+BOUND = 0.02
 #: Simulated seconds per second.
 SPEED = 1.0
 CONFIG = """\
@@ -49,7 +51,7 @@ def place(message: Any) -> tuple[int, float, float]:
 def test_the_filter_agrees_with_the_truth(
         probe: Probe, start: Callable[..., LiveHusky], run: Callable[..., Any],
         program: Callable[[str, str], Path], tmp_path: Path, manoeuvre: str) -> None:
-    """Vx of the wheels with heading and yaw rate of the IMU: within 3 % of the way, all along."""
+    """Vx of the wheels with heading and yaw rate of the IMU: within 2 % of the way, all along."""
     ekf_node = program('robot_localization', 'ekf_node')
     (tmp_path / 'ekf.yaml').write_text(CONFIG, encoding='utf-8')
     truth = probe.listen('nav_msgs/msg/Odometry', '/ground_truth', 200)
@@ -77,7 +79,7 @@ def test_the_filter_agrees_with_the_truth(
         list(true.values())[:-1], list(true.values())[1:], strict=True))
     pairs = [((x, y), true[stamp]) for stamp, x, y in map(place, filtered) if stamp in true]
     worst = max(math.dist(*pair) for pair in pairs)
-    print(f'{manoeuvre}: {way:.1f} m, filter within {worst:.3f} m ({worst / way:.1%})')
+    print(f'figure: {manoeuvre}: {way:.1f} m, filter within {worst:.3f} m ({worst / way:.1%})')
     assert way > 3.0
     assert len(pairs) > 100
     assert worst < BOUND * way
