@@ -61,7 +61,8 @@ def test_ten_lines_lead_from_a_bag_to_a_named_effect(
     html = [output.data.get('text/html', '') for cell in cells for output in cell.outputs
             if output.output_type == 'execute_result']
     assert any('Enough for a diagnosis' in one for one in html)
-    assert any('Missing effect found: dry friction in the drivetrain, left side' in one for one in html)
+    named = 'Missing effect found: dry friction in the drivetrain, left side'
+    assert any(named in one for one in html)
     assert any('image/png' in output.get('data', {}) for output in cells[3].outputs)
     page = (tmp_path / 'found' / 'report.html').read_text(encoding='utf-8')
     assert 'What to change' in page
