@@ -37,8 +37,8 @@ EXTRAS = {
 }
 EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report', 'search')
                  for need in EXTRAS[extra]]
-# What the notebooks need and no more: neither DDS nor an engine.
-EXTRAS['notebook'] = [*(need for extra in ('fast', 'plot', 'bags', 'report', 'tables')
+# What the notebooks and `evaluate` need and no more: neither DDS nor an engine.
+EXTRAS['notebook'] = [*(need for extra in ('fast', 'plot', 'bags', 'report', 'search', 'tables')
                         for need in EXTRAS[extra]), 'jupyterlab>=4']
 EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale'], *EXTRAS['tables']]
 EXTRAS['test'] = ['hypothesis>=6.100', 'ipykernel>=6', 'jsonschema>=4.18', 'nbclient>=0.10',

@@ -80,3 +80,17 @@ def test_every_module_imports_without_the_extras(part: str) -> None:
                           timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     assert importlib.util.find_spec(names[0]) is not None
+
+
+def test_no_hint_asks_an_index_for_this_package() -> None:
+    said = [path for folder in ('lg_husky_sim', 'docs') for path in (ROOT / folder).rglob('*')
+            if path.suffix in ('.py', '.md')
+            and re.search(r"install '?lg_husky_sim\[", path.read_text(encoding='utf-8'))]
+    assert said == []
+
+
+def test_the_extra_for_notebooks_brings_what_evaluate_needs() -> None:
+    setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
+    listed = re.search(r"EXTRAS\['notebook'\] = .* in \(([^)]*)\)", setup)
+    assert listed is not None
+    assert "'search'" in listed[1]

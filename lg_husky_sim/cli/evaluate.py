@@ -77,8 +77,7 @@ def command(
     if not (cases or calibrate or steps):
         chosen = ('synthetic', 'engine') if find_spec('mujoco') else ('synthetic',)
         if len(chosen) == 1:
-            say.remark('without the case engine: it needs MuJoCo, pip install '
-                       "'lg_husky_sim[engine]'")
+            say.remark('without the case engine: it needs MuJoCo, pip install mujoco')
     start = apply_settings(load_model(model), parse_settings(settings))
     request = Request(chosen, calibrate, held_out, rivals, steps, start, seed, starts, jobs,
                       TopicMap.parse(topics))

@@ -160,5 +160,5 @@ def _report(trials: Sequence[tuple[Path, dict[str, Any], list[dict[str, Any]]]],
     if drawable:
         draw(next(iter(sections.values()))[0], page.parent / 'pictures')
     else:
-        click.echo("no pictures: pip install 'lg_husky_sim[plot]'", err=True)
+        click.echo('no pictures: pip install matplotlib', err=True)
     click.echo(f'page: {page}')

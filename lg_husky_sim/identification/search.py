@@ -11,7 +11,7 @@ import math
 import random
 from typing import Any
 
-from lg_husky_sim.errors import MissingExtraError
+from lg_husky_sim.extras import require
 from lg_husky_sim.identification.paper import paper
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -97,11 +97,9 @@ def genetic(objective: Objective, lower: FloatArray, upper: FloatArray, seed: in
     MissingExtraError
         If the package `deap` is not installed.
     """
-    try:
-        from deap import tools
-    except ImportError as error:
-        raise MissingExtraError('deap is needed to run the genetic algorithm and is not '
-                                "installed: pip install 'lg_husky_sim[search]'") from error
+    require('deap', 'run the genetic algorithm')
+    from deap import tools
+
     size = population or paper().population
     count = generations or paper().generations
     fraction = paper().crossover_fraction if crossover_fraction is None else crossover_fraction

@@ -24,7 +24,7 @@ def _engine() -> Any:
     try:
         import pybullet
     except ImportError as error:
-        message = "world 'g4' needs Bullet: pip install 'lg_husky_sim[bullet]'"
+        message = "world 'g4' needs Bullet: pip install pybullet"
         raise MissingExtraError(message) from error
     return pybullet
 

@@ -63,7 +63,7 @@ def _engine() -> Any:
     try:
         import mujoco
     except ImportError as error:
-        message = "world 'g2' needs MuJoCo: pip install 'lg_husky_sim[engine]'"
+        message = "world 'g2' needs MuJoCo: pip install mujoco"
         raise MissingExtraError(message) from error
     return mujoco
 
