@@ -18,6 +18,7 @@ from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES
 from lg_husky_sim.diagnosis.localisation import Missing, missing_efforts, strengths
 from lg_husky_sim.diagnosis.planning import named_drive
 from lg_husky_sim.diagnosis.report import report_data
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.model_file import ModelFile
@@ -41,8 +42,6 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Lines of new terms up to which a page shows them without a click.
-MOST_TERMS = 10
 #: Factor of a law that is switched off: no Stribeck share.
 _ABSENT = re.compile(r'\(1\+\(0\.0\)\*exp\([^*]*\*\*2\)\)\*')
 #: Term of a law whose factor is zero.
@@ -163,7 +162,7 @@ def _where(case: Case) -> tuple[Section, ...]:
     terms = new_terms(diagnosis.model, plain)
     drawing = Drawing('graph', caption, lambda: _graph_figure(plain, final, elements))
     heading, text = 'New terms in the equations', '\n'.join(terms)
-    if len(terms) > MOST_TERMS:
+    if len(terms) > setting('terms_shown'):
         sections = [Section('Where in the model', drawings=(drawing,)),
                     Section(heading, verbatim=text, folded=True)]
     else:
