@@ -3,9 +3,9 @@
 """
 Reading and writing by ROS's own rosbag2_py gives what rosbags gives.
 
-The module is stood in for by one with the signatures of rosbag2_py in Jazzy (pybind11 sources of
-rosbag2, branch jazzy), so that the way there and back is tested where ROS is not installed. Where
-rclpy is, messages are made and serialised by it.
+Where rosbag2_py is not installed, one with its signatures in Jazzy (pybind11 sources of rosbag2,
+branch jazzy) stands in for it, so that the way there and back is tested everywhere. Where rclpy
+is, messages are made and serialised by it.
 """
 
 from __future__ import annotations
@@ -115,19 +115,20 @@ class Kind(str):
 
 @pytest.fixture
 def by_ros(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have rosbags missing and ROS there."""
+    """Have rosbags missing, and ROS there, the real one as far as it is installed."""
     store = _store()
-    names = ['rosbag2_py']
+    names = ['rosbag2_py'] if find_spec('rosbag2_py') is None else []
     if find_spec('rclpy') is None:
         names += ['rosidl_runtime_py', 'rosidl_runtime_py.utilities', 'rclpy',
                   'rclpy.serialization']
     modules = {name: ModuleType(name) for name in names}
-    modules['rosbag2_py'].__dict__.update(
-        SequentialReader=Reader, SequentialWriter=Writer, TopicMetadata=SimpleNamespace,
-        ConverterOptions=lambda one, other: (one, other),
-        StorageOptions=lambda **values: SimpleNamespace(**values),
-        StorageFilter=lambda topics: SimpleNamespace(topics=topics))
-    if len(names) > 1:
+    if 'rosbag2_py' in modules:
+        modules['rosbag2_py'].__dict__.update(
+            SequentialReader=Reader, SequentialWriter=Writer, TopicMetadata=SimpleNamespace,
+            ConverterOptions=lambda one, other: (one, other),
+            StorageOptions=lambda **values: SimpleNamespace(**values),
+            StorageFilter=lambda topics: SimpleNamespace(topics=topics))
+    if 'rclpy' in modules:
         modules['rosidl_runtime_py.utilities'].__dict__['get_message'] = Kind
         modules['rclpy.serialization'].__dict__.update(
             deserialize_message=store.deserialize_cdr,
