@@ -275,7 +275,7 @@ class NumericModel:
     def _refuse_derivatives(self, lever: FloatArray, by_input: FloatArray) -> None:
         for row, column in zip(*np.nonzero(np.abs(lever @ by_input) > TOLERANCE), strict=True):
             raise GraphError(
-                f'the argument {self.arguments[row]} of a non-linear law hangs on the rate of '
+                f'the argument {self.arguments[row]} of a non-linear law depends on the rate of '
                 f'change of input {self.inputs[column]!r}; put a D-type in series with the source')
 
     def _singular(self) -> ParameterError:

@@ -117,7 +117,7 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         r"branch 'L': the thermal domain has no T-type; use an A-type"),
     'thermal two-port': (
         lambda: TwoPort('k', Kind.TRANSFORMER, (E, 'a', 'ground'), (T, 'b', 'ground'), 'k'),
-        r"port 'k.2' is thermal: temperature times heat flow is not a power"),
+        r"port 'k.2' is thermal: temperature times heat flow is no power"),
     'branch to itself': (
         lambda: resistor('R', 'a', 'a'), r"branch 'R' starts and ends at node 'a'"),
     'open end': (
