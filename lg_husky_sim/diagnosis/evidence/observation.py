@@ -184,7 +184,7 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
         drive.commands.times + delay, drive.commands.values, drive.commands.names)
     events = Events(commands, times, start=drive.start)
     spans = times[parts['wheels']] - times[parts['begins']] if begins.size else begins
-    return Wanted(events, parts, np.maximum(spans, setting('shortest_window')))
+    return Wanted(events, parts, spans)
 
 
 def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) -> Motion:
@@ -265,8 +265,8 @@ def _rate(motion: Motion, drive: Drive, side: str, reading: Reading, late: float
         found: FloatArray = np.interp(
             drive.wheel_times - late, motion.times[motion.wanted.parts['wheels']], followed)
         return found
-    turned = (motion.column(f'angle_{side}', 'wheels') - motion.column(f'angle_{side}', 'begins'))
-    return np.asarray(turned / motion.wanted.spans, dtype=np.float64)
+    turned = motion.column(f'angle_{side}', 'wheels') - motion.column(f'angle_{side}', 'begins')
+    return _mean_rate(turned, motion.wanted.spans, motion.column(f'wheel_{side}', 'wheels'))
 
 
 def _yaw_rate(motion: Motion) -> FloatArray:
@@ -276,8 +276,12 @@ def _yaw_rate(motion: Motion) -> FloatArray:
         return motion.column('yaw_rate', 'imu')
     turned = motion.column('heading', 'imu') - motion.column('heading', 'imu_begins')
     span = motion.times[parts['imu']] - motion.times[parts['imu_begins']]
-    found: FloatArray = np.where(span > 1e-6, turned / np.maximum(span, 1e-6),
-                                 motion.column('yaw_rate', 'imu'))
+    return _mean_rate(turned, span, motion.column('yaw_rate', 'imu'))
+
+
+def _mean_rate(turned: FloatArray, span: FloatArray, rate: FloatArray) -> FloatArray:
+    # That of the moment where all of the window is before the drive.
+    found: FloatArray = np.where(span > 1e-6, turned / np.maximum(span, 1e-6), rate)
     return found
 
 
