@@ -14,7 +14,7 @@ lowers the cost by, in nats: a likelihood ratio of exp(gain).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -215,11 +215,19 @@ class Evidence:
 
     def derivatives(self, point: Point, predicted: Sequence[FloatArray],
                     which: Sequence[int]) -> list[FloatArray]:
-        """Return derivatives of the readings of each drive by some of the places."""
+        """
+        Return derivatives of the readings of each drive by some of the places.
+
+        Those by lags of the commands are the sums of those by the delays of the sensors: only
+        their sum counts. Finite differences would tell them apart by their errors.
+        """
         names = {u.name: k for k, u in enumerate(point.unknowns) if u.kind == 'log'}
+        lags = self._lags(names).keys() & set(which)
+        delays = [names[name] for name in APART[0] if name in names]
+        wanted = (set(which) - lags).union(delays if lags else ())
         together = [own for row in APART if len(own := [
-            names[name] for name in row if names.get(name) in which]) > 1]
-        alone = set(which).difference(*together)
+            names[name] for name in row if names.get(name) in wanted]) > 1]
+        alone = wanted.difference(*together)
 
         def columns(ks: Sequence[int]) -> list[tuple[int, list[FloatArray]]]:
             steps = np.zeros(len(point.unknowns))
@@ -240,8 +248,16 @@ class Evidence:
                 found.append((k, parts))
             return found
         made = dict(itertools.chain.from_iterable(
-            self.pool.map(columns, [*([k] for k in which if k in alone), *together])))
+            self.pool.map(columns, [*([k] for k in sorted(alone)), *together])))
+        for k in lags:
+            made[k] = [sum(parts) if on else np.zeros_like(parts[0]) for on, *parts in zip(
+                self._lags(names)[k], *(made[delay] for delay in delays), strict=True)]
         return [np.column_stack([made[k][d] for k in which]) for d in range(len(self.drives))]
+
+    def _lags(self, names: Mapping[str, int]) -> dict[int, list[bool]]:
+        # Places of the lags of commands, and the drives that each delays.
+        return {names[name]: [name in ('command_delay', d.late) for d in self.drives]
+                for name in ('command_delay', *(d.late for d in self.drives)) if name in names}
 
     def fit(self, start: Point, slopes: Sequence[FloatArray] | None = None, *,
             rounds: int = 8, renew: Sequence[int] | None = None, inflation: float = 1.0) -> Fit:
