@@ -211,7 +211,14 @@ class Evidence:
 
     def surprise(self, fit: Fit) -> float:
         """Return the cost of a fit under this noise, comparable under any noise [nats]."""
-        return fit.cost + sum(float(np.sum(np.log(w.scale))) for w in self.whiteners)
+        return fit.cost + self._spread()
+
+    def surprise_at(self, point: Point) -> float:
+        """Return the same of a point."""
+        return self.cost(self.residuals(self.predict(point)), point) + self._spread()
+
+    def _spread(self) -> float:
+        return sum(float(np.sum(np.log(w.scale))) for w in self.whiteners)
 
     def derivatives(self, point: Point, predicted: Sequence[FloatArray],
                     which: Sequence[int]) -> list[FloatArray]:

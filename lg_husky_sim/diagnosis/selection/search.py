@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from lg_husky_sim.diagnosis.evidence.base_clock import ticking
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit, Point
 from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
 from lg_husky_sim.diagnosis.evidence.unknowns import start_of, tick_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, Numbers
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
@@ -219,6 +220,9 @@ class _Recalibrated:
 def _recalibrated(evidence: Evidence, start: Point) -> _Recalibrated:
     # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
     rough = evidence.fit(start, rounds=1)
+    stamped, point = likeliest_stamps(evidence, rough)
+    if stamped is not evidence:
+        evidence, rough = stamped, stamped.fit(point, rounds=1)
     logged = _as_logged(evidence, rough)
     start = _nominal(logged.fit.point)
     return _Recalibrated(evidence, rough, logged, *calibrated(evidence.about(start), start))
