@@ -88,6 +88,22 @@ def test_a_command_that_the_log_lost_is_put_back() -> None:
     np.testing.assert_allclose(commands.values[place], truth, atol=0.1)
 
 
+@pytest.mark.parametrize('late', [0.06, 0.13, 0.27])
+def test_a_command_that_came_late_acts_then_with_all_behind_it(late: float) -> None:
+    def heard(sent: TimeSeries) -> TimeSeries:
+        times = np.array(sent.times)
+        times[150:] = np.maximum(times[150:], times[150] + late)
+        return TimeSeries(times, sent.values, sent.names)
+    evidence, _ = fitted(driven('late', 5, heard))
+    commands = evidence.drives[0].commands
+    # The next one after a gap is the last that waited.
+    first = commands.times[np.searchsorted(commands.times, 14.95)]
+    assert first == pytest.approx(15.0 + late, abs=0.02)
+    waited = 150 + int(np.floor(late / 0.1))
+    truth = driven('kept', 5, lambda sent: sent).streams['command'].values[waited]
+    np.testing.assert_array_equal(commands.values[np.searchsorted(commands.times, 14.95)], truth)
+
+
 def test_a_robot_that_hears_everything_keeps_all_its_commands() -> None:
     evidence, _ = fitted(driven('all', 6, lambda sent: sent))
     assert evidence.drives[0].commands is evidence.drives[0].logged

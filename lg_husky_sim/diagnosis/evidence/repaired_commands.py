@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Single commands that a base missed, or that a log lost, by what its wheels did after them."""
+"""Single commands that a base missed or got late, or that a log lost, by what its wheels did."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def repaired(drive: Drive, whitener: Whitener, whitened: FloatArray, score: Scor
     """
     Return a drive with the commands that its base seems to have got.
 
-    Where the wheels leave a simulation by far more than noise, a command is taken out, or put into
-    a gap between those before and after it, if that makes the drive likelier by a stated gain. Of
-    few commands only: up to a stated share.
+    Where the wheels leave a simulation by far more than noise, a command is taken out, acts later,
+    or is put into a gap between those before and after it, if that makes the drive likelier by a
+    stated gain. Of few commands only: up to a stated share.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _suspects(times: FloatArray, sizes: FloatArray, stamps: FloatArray) -> list[
 
 
 def _others(drive: Drive, stamp: float, score: Score) -> Iterator[tuple[Drive, FloatArray]]:
-    # Without the command at a stamp; and with one in the middle of the gap after it.
+    # Without the command at a stamp, with it late, and with one in the middle of the gap after it.
     commands = drive.commands
     place = int(np.argmin(np.abs(commands.times - stamp)))
     keep = np.arange(commands.times.size) != place
@@ -98,9 +98,30 @@ def _others(drive: Drive, stamp: float, score: Score) -> Iterator[tuple[Drive, F
     yield without, score(without)
     gaps = np.diff(commands.times)
     usual = float(np.median(gaps))
+    yield _held(drive, place, usual, score)
     if place < gaps.size and setting('lost_gap') * usual < gaps[place] < (
             setting('pause') * usual):
         yield _filled(drive, place, round(float(gaps[place]) / usual) - 1, score)
+
+
+def _held(drive: Drive, place: int, usual: float, score: Score) -> tuple[Drive, FloatArray]:
+    # With a command that came late by so many usual gaps; those behind it waited for it.
+    commands = drive.commands
+
+    def late(gaps: float) -> tuple[float, float, Drive, FloatArray]:
+        until = commands.times[place] + gaps * usual
+        times = np.array(commands.times)
+        times[place:] = np.maximum(times[place:], until)
+        last = np.append(np.diff(times) > 0.0, True)
+        other = replace(drive, commands=TimeSeries(
+            times[last], commands.values[last], commands.names))
+        e = score(other)
+        return _cost(e), gaps, other, e
+    best = min((late(gaps) for gaps in (0.5, 1.5, 2.5)), key=lambda one: one[0])
+    for step in (0.5, 0.25, 0.125):
+        best = min((best, *(late(best[1] + side * step) for side in (-1.0, 1.0)
+                            if best[1] + side * step > 0.0)), key=lambda one: one[0])
+    return best[2], best[3]
 
 
 def _filled(drive: Drive, place: int, count: int, score: Score) -> tuple[Drive, FloatArray]:
