@@ -116,7 +116,7 @@ def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]
 
 def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tried]:
     """
-    Return what to begin with where recalibrated numbers have taken the place of an effect.
+    Return what to begin with where recalibrated numbers or noise have taken the place of an effect.
 
     Parameters
     ----------
@@ -135,17 +135,15 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tri
     -------
     list of Tried
         The effect that gains most from there, with numbers, noise and reading of its own; none
-        where the prior penalty of the recalibration is small.
+        where none promised more than a reading and the recalibration has a small prior penalty.
     """
-    if not is_distorted(base):
-        return []
     names = [u.name for u in base.point.unknowns]
     found = []
     if logged.better and names == [u.name for u in rough.point.unknowns]:
         best = logged.better[0]
         found.append(_best_start(first, rough, [(
             best.hypothesis, best.fit.point.places[:len(names)], numbers_of(best))]))
-    else:
+    elif is_distorted(base):
         found.append(read_anew(first, base, logged.early))
         nominal = _nominal(base.point)
         first = first.about(nominal)
