@@ -14,14 +14,14 @@ lowers the cost by, in nats: a likelihood ratio of exp(gain).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
-import itertools
 
 from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.diagnosis.evidence.deviation import slow_model
+from lg_husky_sim.diagnosis.evidence.differences import Differences
 from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.frames import frame_of
 from lg_husky_sim.diagnosis.evidence.noise import (
@@ -32,9 +32,7 @@ from lg_husky_sim.diagnosis.evidence.noise import (
     whitener_of,
 )
 from lg_husky_sim.diagnosis.evidence.observation import (
-    APART,
     Motion,
-    moved_by,
     observe,
     Reading,
     simulate,
@@ -222,49 +220,9 @@ class Evidence:
 
     def derivatives(self, point: Point, predicted: Sequence[FloatArray],
                     which: Sequence[int]) -> list[FloatArray]:
-        """
-        Return derivatives of the readings of each drive by some of the places.
-
-        Those by lags of the commands are the sums of those by the delays of the sensors: only
-        their sum counts. Finite differences would tell them apart by their errors.
-        """
-        names = {u.name: k for k, u in enumerate(point.unknowns) if u.kind == 'log'}
-        lags = self._lags(names).keys() & set(which)
-        delays = [names[name] for name in APART[0] if name in names]
-        wanted = (set(which) - lags).union(delays if lags else ())
-        together = [own for row in APART if len(own := [
-            names[name] for name in row if names.get(name) in wanted]) > 1]
-        alone = wanted.difference(*together)
-
-        def columns(ks: Sequence[int]) -> list[tuple[int, list[FloatArray]]]:
-            steps = np.zeros(len(point.unknowns))
-            for k in ks:
-                unknown = point.unknowns[k]
-                over = point.places[k] + unknown.step > unknown.upper
-                steps[k] = -unknown.step if over else unknown.step
-            shifted = self.predict(point.at(point.places + steps))
-            changes = [a - b for a, b in zip(shifted, predicted, strict=True)]
-            if len(ks) == 1:
-                return [(ks[0], [change / steps[ks[0]] for change in changes])]
-            found = []
-            for k in ks:
-                parts = [np.zeros_like(change) for change in changes]
-                for part, change, drive in zip(parts, changes, self.drives, strict=True):
-                    for rows in moved_by(point.unknowns[k].name, drive):
-                        part[rows] = change[rows] / steps[k]
-                found.append((k, parts))
-            return found
-        made = dict(itertools.chain.from_iterable(
-            self.pool.map(columns, [*([k] for k in sorted(alone)), *together])))
-        for k in lags:
-            made[k] = [sum(parts) if on else np.zeros_like(parts[0]) for on, *parts in zip(
-                self._lags(names)[k], *(made[delay] for delay in delays), strict=True)]
+        """Return derivatives of the readings of each drive by some of the places."""
+        made = Differences(self.predict, self.drives, self.pool).by(point, predicted, which)
         return [np.column_stack([made[k][d] for k in which]) for d in range(len(self.drives))]
-
-    def _lags(self, names: Mapping[str, int]) -> dict[int, list[bool]]:
-        # Places of the lags of commands, and the drives that each delays.
-        return {names[name]: [name in ('command_delay', d.late) for d in self.drives]
-                for name in ('command_delay', *(d.late for d in self.drives)) if name in names}
 
     def fit(self, start: Point, slopes: Sequence[FloatArray] | None = None, *,
             rounds: int = 8, renew: Sequence[int] | None = None, inflation: float = 1.0) -> Fit:

@@ -1,0 +1,99 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Derivatives of predicted readings by the unknowns, by finite differences of simulations.
+
+Numbers of the log that move readings of different sensors share a simulation. Of what commands and
+readings are late only the sum counts: derivatives by lags of the commands are the sums of those by
+the delays of the sensors, since finite differences would tell them apart by their errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+import itertools
+from typing import TYPE_CHECKING
+
+from lg_husky_sim.diagnosis.evidence.drives import Drive
+from lg_husky_sim.diagnosis.evidence.observation import APART, moved_by
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+if TYPE_CHECKING:
+    from lg_husky_sim.diagnosis.evidence.evidence import Point
+
+
+@dataclass(frozen=True)
+class Differences:
+    """
+    Difference quotients of what a model predicts.
+
+    Parameters
+    ----------
+    predict : callable
+        Returns the readings of each drive at a point.
+    drives : sequence of Drive
+    pool : concurrent.futures.Executor
+        Threads for the independent simulations.
+    """
+
+    predict: Callable[[Point], tuple[FloatArray, ...]]
+    drives: Sequence[Drive]
+    pool: Executor
+
+    def by(self, point: Point, predicted: Sequence[FloatArray], which: Sequence[int]
+           ) -> dict[int, list[FloatArray]]:
+        """
+        Return derivatives of the readings of each drive by some places, by the place.
+
+        Parameters
+        ----------
+        point : Point
+        predicted : sequence of numpy.ndarray
+            Readings of each drive there.
+        which : sequence of int
+            Places of its unknowns.
+        """
+        names = {u.name: k for k, u in enumerate(point.unknowns) if u.kind == 'log'}
+        acting = self._lags(names)
+        lags = acting.keys() & set(which)
+        delays = [names[name] for name in APART[0] if name in names]
+        wanted = (set(which) - lags).union(delays if lags else ())
+        together = [own for row in APART if len(own := [
+            names[name] for name in row if names.get(name) in wanted]) > 1]
+        alone = wanted.difference(*together)
+        made = dict(itertools.chain.from_iterable(self.pool.map(
+            lambda ks: self._quotients(point, predicted, ks),
+            [*([k] for k in sorted(alone)), *together])))
+        for k in lags:
+            made[k] = [sum(parts) if on else np.zeros_like(parts[0]) for on, *parts in zip(
+                acting[k], *(made[delay] for delay in delays), strict=True)]
+        return made
+
+    def _lags(self, names: Mapping[str, int]) -> dict[int, list[bool]]:
+        # Places of the lags of commands, and whether each delays each drive.
+        return {names[name]: [name in ('command_delay', d.late) for d in self.drives]
+                for name in ('command_delay', *(d.late for d in self.drives)) if name in names}
+
+    def _quotients(self, point: Point, predicted: Sequence[FloatArray], ks: Sequence[int]
+                   ) -> list[tuple[int, list[FloatArray]]]:
+        # By places that move different readings, if there is more than one.
+        steps = np.zeros(len(point.unknowns))
+        for k in ks:
+            unknown = point.unknowns[k]
+            over = point.places[k] + unknown.step > unknown.upper
+            steps[k] = -unknown.step if over else unknown.step
+        shifted = self.predict(point.at(point.places + steps))
+        changes = [a - b for a, b in zip(shifted, predicted, strict=True)]
+        if len(ks) == 1:
+            return [(ks[0], [change / steps[ks[0]] for change in changes])]
+        found = []
+        for k in ks:
+            parts = [np.zeros_like(change) for change in changes]
+            for part, change, drive in zip(parts, changes, self.drives, strict=True):
+                for rows in moved_by(point.unknowns[k].name, drive):
+                    part[rows] = change[rows] / steps[k]
+            found.append((k, parts))
+        return found
