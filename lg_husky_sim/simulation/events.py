@@ -104,6 +104,31 @@ class Propagator:
         """Return the wheel rates [rad/s] at which the wheels' dampers carry no torque."""
         return self._starts.rates_without_slip(twist)
 
+    def run_in(self, commands: TimeSeries, begin: FloatArray, start: FloatArray) -> FloatArray:
+        """
+        Return a flat state to start from after some commands.
+
+        Parameters
+        ----------
+        commands : TimeSeries
+            Before the start, as of :class:`Events`.
+        begin : numpy.ndarray, shape (n + TAIL,)
+            Flat state at the first of them.
+        start : numpy.ndarray, shape (n + TAIL,)
+            What is known of the start, with its time.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n + TAIL,)
+            As of :meth:`InitialStates.run_in`.
+        """
+        place = len(self.plant.states) + 6
+        events = Events(commands, start[place:place + 1], start=float(begin[place]))
+        flat = np.array(begin)
+        run_kernel(flat, events.stamps, events.values, events.times, events.places,
+                   np.empty((1, len(COLUMNS))), events.end, False, self.packed)
+        return self._starts.run_in(flat, start)
+
     def run(self, events: Events, initial: FloatArray, *, fine_pose: bool = True) -> FloatArray:
         """
         Drive the plant from a state through all events.

@@ -69,8 +69,7 @@ class InitialStates:
             # and the least change that makes it agree with what is wanted.
             nearest = self.steady @ np.linalg.lstsq(one.rows[:4] @ self.steady, wanted,
                                                     rcond=None)[0]
-            flat[:n] = nearest + np.linalg.lstsq(
-                one.rows[:4], wanted - one.rows[:4] @ nearest, rcond=None)[0]
+            flat[:n] = self._moved_to(nearest, wanted)
         flat[n:n + 2] = wheel_angles
         flat[n + 3:n + 7] = pose.heading, pose.x, pose.y, time
         if command is not None:
@@ -81,6 +80,35 @@ class InitialStates:
             flat[n + SHAPED + 1] = max(-limit.limit_yaw, min(limit.limit_yaw, command.yaw))
             flat[n + WANTED:] = command.forward, command.yaw
         return flat
+
+    def run_in(self, before: FloatArray, start: FloatArray) -> FloatArray:
+        """
+        Return a state to start from that remembers how it came there.
+
+        Parameters
+        ----------
+        before : numpy.ndarray, shape (n + TAIL,)
+            Of a simulation of what was commanded until then.
+        start : numpy.ndarray, shape (n + TAIL,)
+            As the sensors have it, of :meth:`flat`.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n + TAIL,)
+            The latter's pose, rates and time; currents, controllers, belts and the stages of the
+            command of the former.
+        """
+        n = self._set.a.shape[0]
+        flat = np.array(before)
+        flat[:n] = self._moved_to(before[:n], self._set.rows[:4] @ start[:n])
+        flat[n:n + 7] = start[n:n + 7]
+        return flat
+
+    def _moved_to(self, states: FloatArray, wanted: FloatArray) -> FloatArray:
+        # With the least change that makes wheel rates, speed and yaw rate those that are wanted.
+        rows = self._set.rows[:4]
+        found: FloatArray = states + np.linalg.lstsq(rows, wanted - rows @ states, rcond=None)[0]
+        return found
 
     def rates_without_slip(self, twist: BodyTwist) -> tuple[float, float]:
         """Return the wheel rates [rad/s] at which the wheels' dampers carry no torque."""

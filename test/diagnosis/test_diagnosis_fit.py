@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from lg_husky_sim.diagnosis.conclusion import estimates
 from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
-from lg_husky_sim.diagnosis.evidence.drives import Channel, drives_of
+from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, sensor_variance
 from lg_husky_sim.diagnosis.evidence.observation import (
@@ -187,3 +187,32 @@ def test_a_step_stays_inside_the_bounds_and_makes_the_best_of_them() -> None:
         expected = lsq_linear(rows, target, (-reach - 1e-12, reach + 1e-12), tol=1e-12).x
         np.testing.assert_allclose(move, expected, atol=1e-5)
         assert np.all(np.abs(move) <= reach)
+
+
+@pytest.mark.parametrize(('effect', 'sizes'), [
+    (Effect('command_slew', shape='lag'), {'command_lag': 0.3}),
+    (Effect('command_slew', shape='both'), {'slew_forward': 0.8, 'slew_yaw': 1.0}),
+    (Effect('command_latency'), {'latency': 0.15})])
+def test_a_drive_that_begins_in_motion_follows_the_commands_before_it(
+        effect: Effect, sizes: dict[str, float], record: Callable[..., Recording],
+        steps: Sequence[tuple[float, float, float]]) -> None:
+    """A base that smooths commands still follows the step before the gap in a stream."""
+    model = load_model()
+    plant = compile_model(model.structure.with_effect(effect)).at(
+        model.parameters.with_entries(*entries_of(effect, sizes)))
+    recording = record('gap', plant, steps, 5)
+    first = 5.12 + recording.streams['command'].times[0]
+    late = Recording('late', 'late', {
+        name: series if name == 'command' else series.slice(first, np.inf)
+        for name, series in recording.streams.items()}, 0, frames=('odom', 'base_link'))
+    (drive,) = drives_of([late])
+    assert drive.earlier is not None
+    assert drive.earlier.times[-1] < drive.start
+
+    def off(one: Drive) -> float:
+        seen = observe(simulate(plant, one, Reading()), one, Reading())
+        begin = one.channels == int(Channel.WHEEL_LEFT)
+        begin &= (one.times > one.start + 0.1) & (one.times < one.start + 0.6)
+        return float(np.sqrt(np.mean((one.measured - seen)[begin] ** 2)))
+    assert off(drive) < 0.06
+    assert off(replace(drive, earlier=None)) > 3.0 * off(drive)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import enum
 from threading import Lock
 from typing import Any, TypeVar
@@ -101,6 +101,8 @@ class Drive:
         Variance by which each reading is rounded [its unit squared].
     clock : Clock, optional
         Of a base that applies commands at its own ticks, not when they come.
+    earlier : TimeSeries, optional
+        Commands before the start, of a robot that is in motion there.
     """
 
     recording: str
@@ -125,6 +127,7 @@ class Drive:
     logged: TimeSeries = field(kw_only=True)
     rounding: FloatArray = field(kw_only=True)
     clock: Clock | None = None
+    earlier: TimeSeries | None = None
 
     @property
     def name(self) -> str:
@@ -316,6 +319,12 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
         rounding=np.concatenate([_rounding(v) for _, _, v in pieces]))
 
 
+def _remembering(drive: Drive, commands: TimeSeries) -> Drive:
+    before = commands.slice(drive.start - setting('run_in'), drive.start)
+    moved = not drive.still and len(before) > 1
+    return replace(drive, earlier=before) if moved else drive
+
+
 def drives_of(recordings: Sequence[Recording]) -> tuple[Drive, ...]:
     """
     Return all usable drives of recordings.
@@ -338,7 +347,8 @@ def drives_of(recordings: Sequence[Recording]) -> tuple[Drive, ...]:
         recording.stream('command')
         kind = recording.present.get(recording.topics.get('command', ''), '')
         stamped = kind.endswith('Stamped')
-        own = [d for d in (drive_of(s, stamped) for s in segments(recording)) if d is not None]
+        own = [_remembering(d, recording.streams['command'])
+               for d in (drive_of(s, stamped) for s in segments(recording)) if d is not None]
         if not own:
             raise RecordingError(
                 f'recording {recording.name} has no stretch of {setting("shortest_segment"):g} s '

@@ -179,9 +179,15 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
         parts[name] = slice(place, place + times.size)
         place += times.size
     times = np.maximum(np.concatenate(list(groups.values())), drive.start)
+    commands = drive.commands
+    if drive.earlier is not None:
+        # The command in force at the start came at its own time.
+        stamps = commands.times > drive.start
+        commands = TimeSeries(np.append(drive.earlier.times, commands.times[stamps]), np.vstack([
+            drive.earlier.values, commands.values[stamps]]), commands.names)
     delay = command_lag(drive, reading)
-    commands = drive.commands if delay == 0.0 else TimeSeries(
-        drive.commands.times + delay, drive.commands.values, drive.commands.names)
+    if delay != 0.0:
+        commands = TimeSeries(commands.times + delay, commands.values, commands.names)
     events = Events(commands, times, start=drive.start)
     spans = times[parts['wheels']] - times[parts['begins']] if begins.size else begins
     return Wanted(events, parts, spans)
@@ -214,7 +220,8 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
     key = (reading.wheels, reading.imu, window,
            reading.values.get('imu_window'), command_lag(drive, reading), delays, probe)
     wanted = drive.remembered(key, lambda: _wanted(drive, reading, delays, probe))
-    rows = drive.rows((key, _signature(plant)), lambda: _driven(plant, drive, wanted.events))
+    rows = drive.rows((key, _signature(plant)), lambda: _driven(
+        plant, drive, wanted.events, command_lag(drive, reading)))
     events = wanted.events
     times = events.times
     if events.order is not None:
@@ -223,7 +230,7 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
     return Motion(times, rows, wanted, plant)
 
 
-def _driven(plant: Plant, drive: Drive, events: Events) -> FloatArray:
+def _driven(plant: Plant, drive: Drive, events: Events, lag: float) -> FloatArray:
     # Rows of the kernel.
     kept = plant.__dict__
     # One for all drives: the modes of a plant are found once.
@@ -240,6 +247,13 @@ def _driven(plant: Plant, drive: Drive, events: Events) -> FloatArray:
         twist = BodyTwist(0.5 * (left + right) / ahead, (right - left) / (turning[1] - turning[0]))
     state = propagator.initial(drive.pose, twist, drive.start, drive.wheel_rates,
                                drive.wheel_angles, before)
+    if drive.earlier is not None:
+        # What the base still does of these, at the start, not long ago.
+        earlier = TimeSeries(drive.earlier.times + lag, drive.earlier.values, drive.earlier.names)
+        begin = float(drive.earlier.times[0])
+        state = propagator.run_in(earlier, propagator.initial(
+            drive.pose, twist, begin, drive.wheel_rates, drive.wheel_angles,
+            commanded_until(begin, earlier, drive.twist, drive.wheel_rates)), state)
     return propagator.run(events, state, fine_pose=False)
 
 

@@ -116,7 +116,7 @@ def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]
 
 def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tried]:
     """
-    Return what to begin with where recalibrated numbers or noise have taken the place of an effect.
+    Return what to begin with where recalibrated numbers or noise may hide an effect.
 
     Parameters
     ----------
@@ -243,12 +243,22 @@ def _at_ticks(known: _Recalibrated, start: Point, progress: Progress) -> _Recali
 
 
 def _nominal(point: Point) -> Point:
-    # The robot as it should be, read like a point.
+    # The robot as it should be, with the effects of a point and read like it.
     centres = start_of(point.unknowns)
     for place, unknown in enumerate(point.unknowns):
-        if unknown.kind == 'log':
+        if unknown.kind != 'model':
             centres[place] = point.places[place]
     return point.at(centres)
+
+
+def _settled(evidence: Evidence, point: Point) -> tuple[Evidence, Fit]:
+    # The likeliest numbers and noise of an adopted structure: where they began far from the robot
+    # as it should be, since the base had absorbed the effect, from there, too.
+    found = [calibrated(evidence, point, 1)]
+    if is_distorted(found[0][1]):
+        start = _nominal(found[0][1].point)
+        found.append(calibrated(evidence.about(start), start))
+    return min(found, key=lambda one: one[0].surprise(one[1]))
 
 
 def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
@@ -323,7 +333,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             break
         found.append(best.hypothesis)
         least = setting('least_part') * rounds[0].tried[0].gain
-        evidence, base = calibrated(evidence, best.fit.point, 1)
+        evidence, base = _settled(evidence, best.fit.point)
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
             postponed = False
