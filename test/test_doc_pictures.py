@@ -90,7 +90,7 @@ def test_the_picture_of_the_graph_is_that_of_todays_graph(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(('page', 'first', 'last'), [
     ('README.md', 'The finding: its', 'Clearpath'),
-    ('docs/real_recordings.md', 'that\n\n- the base', 'It also notes'),
+    ('docs/real_recordings.md', 'that\n\n- the base', 'What remains'),
 ])
 def test_text_and_picture_of_the_real_diagnosis_give_the_same_figures(
         page: str, first: str, last: str) -> None:
