@@ -74,8 +74,9 @@ class Differences:
 
     def _lags(self, names: Mapping[str, int]) -> dict[int, list[bool]]:
         # Places of the lags of commands, and whether each delays each drive.
-        return {names[name]: [name in ('command_delay', d.late) for d in self.drives]
-                for name in ('command_delay', *(d.late for d in self.drives)) if name in names}
+        each = [('command_delay', d.late, d.own_lag) for d in self.drives]
+        return {names[name]: [name in own for own in each]
+                for name in dict.fromkeys(itertools.chain(*each)) if name in names}
 
     def _quotients(self, point: Point, predicted: Sequence[FloatArray], ks: Sequence[int]
                    ) -> list[tuple[int, list[FloatArray]]]:

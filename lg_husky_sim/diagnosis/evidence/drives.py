@@ -139,6 +139,11 @@ class Drive:
         """Name of how much later than at the likeliest phase its base ticks."""
         return f'tick_delay {self.name}'
 
+    @property
+    def own_lag(self) -> str:
+        """Name of how much later than in other recordings commands act in that of this drive."""
+        return f'lag {self.recording}'
+
     def remembered(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
         """Return what was made of this drive under a key, among the last few; else make it."""
         memory: dict[Hashable, Any] = self.__dict__.setdefault('_memory', {})

@@ -49,8 +49,9 @@ class Reading:
         ``wheel_window`` [s] (length of the window, or time constant of the low pass),
         ``imu_window`` [s] (length of the window of a yaw rate; its period if not given),
         ``delay_wheels``, ``delay_imu``, ``delay_pose`` [s] (how late stamps are),
-        ``command_delay`` [s] (how late the base applies commands), :attr:`Drive.late` [s] (how
-        much later than that in one drive), ``gyro_offset`` [rad/s],
+        ``command_delay`` [s] (how late the base applies commands), :attr:`Drive.late` and
+        :attr:`Drive.own_lag` [s] (how much later than that in one drive, in one recording),
+        ``gyro_offset`` [rad/s],
         ``gyro_gain`` [1] (relative), ``pose_turn`` [rad] (heading of the pose's frame against the
         direction of travel), ``pose_lever`` [m] (how far ahead of the middle it is).
     """
@@ -146,7 +147,7 @@ def probe_times(drive: Drive) -> FloatArray:
 
 def command_lag(drive: Drive, reading: Reading) -> float:
     """Return how late the commands of a drive act [s]."""
-    return reading.get('command_delay') + reading.get(drive.late)
+    return sum(reading.get(name) for name in ('command_delay', drive.late, drive.own_lag))
 
 
 def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bool) -> Wanted:

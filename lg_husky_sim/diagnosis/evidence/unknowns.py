@@ -161,6 +161,9 @@ def base_unknowns(parameters: Parameters, drives: Sequence[Drive]) -> tuple[Unkn
     late = setting('transport') if all(d.stamped for d in drives) else -setting('receipt')
     found.append(delay_unknown('command_delay', late, setting('transport_spread'),
                                setting('base_period')))
+    lags = list(dict.fromkeys(d.own_lag for d in drives))
+    for lag in lags if len(lags) > 1 else ():
+        add(lag, setting('recording_lag'))
     if wheels:
         late_by('delay_wheels', [d.wheel_times for d in drives])
         if any(d.wheel_times.size and not d.counted for d in drives):
