@@ -202,6 +202,7 @@ def test_where_nothing_reads_bags_both_are_named(monkeypatch: pytest.MonkeyPatch
     from lg_husky_sim import extras
     from lg_husky_sim.errors import MissingExtraError
     monkeypatch.setattr(bags, 'find_spec', lambda name: None)
+    monkeypatch.setattr(bags, 'available', lambda: False)
     monkeypatch.setattr(extras, 'find_spec', lambda name: None)
     with pytest.raises(MissingExtraError, match=r'rosbags is needed to read recordings .*pip '
                        'install'):
