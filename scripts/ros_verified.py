@@ -33,8 +33,8 @@ PACKAGES = ('rclpy', 'rcl', *RMWS, 'cyclonedds', 'fastrtps', 'sensor_msgs', 'nav
             'simulation_interfaces', 'tf2_ros_py', 'rosbag2_py', 'ros2cli', 'rclcpp',
             'robot_localization', 'robot_state_publisher', 'teleop_twist_keyboard', 'twist_mux',
             'nav2_planner', 'nav2_navfn_planner', 'nav2_controller', 'nav2_costmap_2d',
-            'nav2_regulated_pure_pursuit_controller', 'nav2_behaviors', 'nav2_bt_navigator',
-            'behaviortree_cpp')
+            'nav2_regulated_pure_pursuit_controller', 'nav2_rotation_shim_controller',
+            'nav2_behaviors', 'nav2_bt_navigator', 'behaviortree_cpp')
 WHEELS = ('numpy', 'numba', 'rosbags', 'cyclonedds', 'pytest')
 #: ROS' own plugins do not know the newest pytest.
 PLUGINS = ('-p', 'no:cacheprovider', '-p', 'no:launch_testing', '-p', 'no:launch_ros',
