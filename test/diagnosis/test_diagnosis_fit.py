@@ -28,6 +28,7 @@ from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
+from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
@@ -216,3 +217,22 @@ def test_a_drive_that_begins_in_motion_follows_the_commands_before_it(
         return float(np.sqrt(np.mean((one.measured - seen)[begin] ** 2)))
     assert off(drive) < 0.06
     assert off(replace(drive, earlier=None)) > 3.0 * off(drive)
+
+
+def test_commands_may_act_later_in_one_recording_than_in_another(
+        drive: Callable[..., Recording]) -> None:
+    """By the phases of the processes on their way; of one recording alone it is no question."""
+    first, second = drive('first', 'nothing', 1), drive('second', 'nothing', 2, True)
+    commands = second.streams['command']
+    early = replace(second, streams={**second.streams, 'command': TimeSeries(
+        commands.times - 0.001, commands.values, commands.names)})
+    drives, model = drives_of([first, early]), load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with ThreadPoolExecutor(1) as pool:
+        evidence = evidence_of(drives, ['first', 'second'], start, first_guess(drives), pool)
+        _, fit = calibrated(evidence, start, 1)
+    lags = [fit.point.log.get(one.own_lag) for one in drives]
+    assert lags[1] - lags[0] == pytest.approx(0.001, abs=0.0004)
+    assert not {one.own_lag for one in drives[:1]} & {
+        u.name for u in base_unknowns(model.parameters, drives[:1])}
