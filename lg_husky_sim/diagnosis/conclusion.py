@@ -10,7 +10,8 @@ import math
 
 from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
 from lg_husky_sim.diagnosis.decision.confidence import confidence, Features
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import neutral_of
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST

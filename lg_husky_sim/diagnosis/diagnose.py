@@ -21,14 +21,16 @@ from lg_husky_sim.diagnosis.conclusion import (
 )
 from lg_husky_sim.diagnosis.decision.confidence import Features
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
-from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts
 from lg_husky_sim.diagnosis.localisation import mismatches, Missing, missing_efforts
+from lg_husky_sim.diagnosis.log_notes import log_notes
 from lg_husky_sim.diagnosis.model_mismatch import model_mismatch, ModelMismatch, unsearched
 from lg_husky_sim.diagnosis.result import Diagnosis, Rivalry, Verdict
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
@@ -47,7 +49,6 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
 from lg_husky_sim.reporting.words import quantity_with_unit
-import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,10 +233,7 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
     if moved:
         notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(moved)
                      + '; check that the model is one of this robot')
-    periods = [d.clock.period for d in found.evidence.drives if d.clock is not None]
-    if periods:
-        notes.append('the base seems to apply commands at its own ticks, every '
-                     f'{1e3 * float(np.mean(periods)):.3g} ms, not when they arrive')
+    notes += log_notes(found.evidence.drives)
     values = found.evidence.noise.values
     notes.append(f'estimated disturbances (standard deviation): force {values["force"]:.2g} '
                  f'N, yaw moment {values["moment"]:.2g} N·m, torque on the wheels of each side '

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import math
 
 from lg_husky_sim.diagnosis.commercial_base import commercial_base, CommercialBase
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Point
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence
+from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.held_out import errors, split
 from lg_husky_sim.diagnosis.result import Finding
 from lg_husky_sim.diagnosis.selection.rounds import Round

@@ -17,10 +17,11 @@ import math
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drive_of
-from lg_husky_sim.diagnosis.evidence.evidence import beginning, evidence_of
+from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import NAMES as LEVELS
 from lg_husky_sim.diagnosis.evidence.noise import Noise
 from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, effect_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.diagnosis.localisation import NAMES

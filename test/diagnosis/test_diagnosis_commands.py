@@ -9,10 +9,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.evidence.drives import Drive, drive_of, drives_of
-from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.log_notes import log_notes
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
@@ -102,11 +104,15 @@ def test_a_command_that_came_late_acts_then_with_all_behind_it(late: float) -> N
     waited = 150 + int(np.floor(late / 0.1))
     truth = driven('kept', 5, lambda sent: sent).streams['command'].values[waited]
     np.testing.assert_array_equal(commands.values[np.searchsorted(commands.times, 14.95)], truth)
+    (note,) = log_notes(evidence.drives)
+    assert note.startswith(f'{waited - 149} of {len(evidence.drives[0].logged)} commands seem to '
+                           'have reached the base late')
 
 
 def test_a_robot_that_hears_everything_keeps_all_its_commands() -> None:
     evidence, _ = fitted(driven('all', 6, lambda sent: sent))
     assert evidence.drives[0].commands is evidence.drives[0].logged
+    assert log_notes(evidence.drives) == ()
     assert evidence.noise.values['command_jitter'] < 0.001
 
 

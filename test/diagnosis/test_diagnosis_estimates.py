@@ -12,9 +12,10 @@ from typing import cast
 from lg_husky_sim.diagnosis.conclusion import estimates, undetermined, without_undetermined
 from lg_husky_sim.diagnosis.diagnose import model_of
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
-from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Fit, Point
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.point import beginning, Point
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, Hypothesis
 from lg_husky_sim.diagnosis.wording import sentence

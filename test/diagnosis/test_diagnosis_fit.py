@@ -11,7 +11,7 @@ from dataclasses import replace
 from lg_husky_sim.diagnosis.conclusion import estimates
 from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drives_of
-from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, sensor_variance
 from lg_husky_sim.diagnosis.evidence.observation import (
     APART,
@@ -20,6 +20,7 @@ from lg_husky_sim.diagnosis.evidence.observation import (
     simulate,
     WheelReading,
 )
+from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, forward_step

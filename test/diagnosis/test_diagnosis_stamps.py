@@ -7,13 +7,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+import re
 
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
-from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.stamps import evened, likeliest_stamps
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.log_notes import log_notes
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import FloatArray, TimeSeries
@@ -73,3 +76,7 @@ def test_the_likelihood_says_whether_stamps_or_readings_are_uneven(
                 **recording.streams, 'wheels': series}), pool)
             stamps, found = (one.drives[0].wheel_times for one in (logged, best))
             assert (np.std(np.diff(found)) < 0.3 * np.std(np.diff(stamps))) == is_even
+            said = re.findall(r'stamps of the wheels jitter by ([\d.]+) ms',
+                              ' '.join(log_notes(best.drives)))
+            assert [float(jitter) for jitter in said] == (
+                [pytest.approx(1e3 * np.std(off), rel=0.1)] if is_even else [])

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from lg_husky_sim.diagnosis.evidence.deviation import slow_model
 from lg_husky_sim.diagnosis.evidence.drives import Channel, drives_of
-from lg_husky_sim.diagnosis.evidence.evidence import beginning, Evidence, evidence_of, Point
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import (
     fit_noise,
     Noise,
@@ -19,6 +19,7 @@ from lg_husky_sim.diagnosis.evidence.noise import (
     whitener_of,
 )
 from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.point import beginning, Point
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.evidence.whitener import MODEL
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of

@@ -14,15 +14,12 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 import itertools
-from typing import TYPE_CHECKING
 
 from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.observation import APART, moved_by
+from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-
-if TYPE_CHECKING:
-    from lg_husky_sim.diagnosis.evidence.evidence import Point
 
 
 @dataclass(frozen=True)

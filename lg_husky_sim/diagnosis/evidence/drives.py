@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import enum
 from threading import Lock
@@ -103,6 +103,9 @@ class Drive:
         Of a base that applies commands at its own ticks, not when they come.
     earlier : TimeSeries, optional
         Commands before the start, of a robot that is in motion there.
+    jitter : mapping of str to float
+        Standard deviation of the logged stamps of a stream from the even ones that took their
+        place [s]; empty where none did.
     """
 
     recording: str
@@ -128,6 +131,7 @@ class Drive:
     rounding: FloatArray = field(kw_only=True)
     clock: Clock | None = None
     earlier: TimeSeries | None = None
+    jitter: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

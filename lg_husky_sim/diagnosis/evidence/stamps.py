@@ -17,7 +17,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, smoothed
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit, Point
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -76,6 +77,7 @@ def _restamped(drive: Drive, stream: str) -> Drive:
     times = evened(own[stream])
     if times is own[stream]:
         return drive
+    jitter = float(np.std(own[stream] - times))
     own[stream] = times
     every = np.array(drive.times)
     for channel in STREAMS[stream][1]:
@@ -83,7 +85,8 @@ def _restamped(drive: Drive, stream: str) -> Drive:
         if part.stop > part.start:
             every[part] = times
     return replace(drive, times=every, wheel_times=own['wheel_times'],
-                   imu_times=own['imu_times'], pose_times=own['pose_times'])
+                   imu_times=own['imu_times'], pose_times=own['pose_times'],
+                   jitter={**drive.jitter, stream: jitter})
 
 
 def likeliest_stamps(evidence: Evidence, fit: Fit) -> tuple[Evidence, Point]:

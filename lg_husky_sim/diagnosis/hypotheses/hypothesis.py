@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
 
-from lg_husky_sim.diagnosis.evidence.evidence import Point
+from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import effect_unknowns, NEUTRAL
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import catalogue, Effect, EffectParameter, Onset

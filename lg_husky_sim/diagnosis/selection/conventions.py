@@ -18,13 +18,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 import math
 
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, Point
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import (
     imu_lag,
     Reading,
     wheel_lag,
     WheelReading,
 )
+from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import window_unknown
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray

@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from lg_husky_sim.diagnosis.conclusion import estimates
-from lg_husky_sim.diagnosis.evidence.evidence import Fit, Point
+from lg_husky_sim.diagnosis.evidence.evidence import Fit
+from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.result import Estimate, Finding
 from lg_husky_sim.diagnosis.sensors.faults import Fault

@@ -1,0 +1,51 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis found out of how a log was made, and read otherwise than it is written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from lg_husky_sim.diagnosis.evidence.drives import Drive
+import numpy as np
+
+#: Streams as a reader knows them, by the field of their stamps.
+NAMES = {'wheel_times': 'wheels', 'imu_times': 'imu', 'pose_times': 'pose'}
+
+
+def log_notes(drives: Sequence[Drive]) -> tuple[str, ...]:
+    """
+    Return what was read otherwise than it is written, in sentences.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+        As the last fit saw them.
+
+    Returns
+    -------
+    tuple of str
+    """
+    notes = []
+    periods = [d.clock.period for d in drives if d.clock is not None]
+    if periods:
+        notes.append('the base seems to apply commands at its own ticks, every '
+                     f'{1e3 * float(np.mean(periods)):.3g} ms, not when they arrive')
+    for stream, name in NAMES.items():
+        jitters = [d.jitter[stream] for d in drives if stream in d.jitter]
+        if jitters:
+            notes.append(f'the stamps of the {name} jitter by {1e3 * max(jitters):.2g} ms about '
+                         f'even times, which took their place in {len(jitters)} of {len(drives)} '
+                         'segments')
+    count = sum(_changed(d) for d in drives if d.clock is None)
+    if count:
+        notes.append(f'{count} of {sum(len(d.logged) for d in drives)} commands seem to have '
+                     'reached the base late or not at all, or to be missing in the log: the '
+                     'model was driven by what the base seems to have got')
+    return tuple(notes)
+
+
+def _changed(drive: Drive) -> int:
+    # A late command is one that is gone and one that is new.
+    logged, got = (set(series.times.tolist()) for series in (drive.logged, drive.commands))
+    return max(len(logged - got), len(got - logged))
