@@ -5,16 +5,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 from lg_husky_sim.diagnosis.diagnose import diagnose
-from lg_husky_sim.diagnosis.evidence.unknowns import effect_unknowns, model_unknown
+from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
+from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.observation import Reading
+from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.unknowns import (
+    base_unknowns,
+    effect_unknowns,
+    loosened,
+    model_unknown,
+)
 from lg_husky_sim.diagnosis.output import headline, summary_text
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
 from lg_husky_sim.diagnosis.sensors.relations import by_names, relations
+from lg_husky_sim.diagnosis.sensors.repair import begun_with, certain, fault_findings
 from lg_husky_sim.diagnosis.sensors.robot import differences, impossible
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model_file import load_model
@@ -79,6 +91,34 @@ def test_the_late_one_of_three_streams_is_named_with_its_lateness(
     assert one.number is not None
     assert one.number.value == pytest.approx(seconds, abs=0.03)
     assert ('later' if seconds > 0.0 else 'earlier') in one.statement
+
+
+def test_what_all_streams_are_late_does_not_go_into_the_one_at_fault(clean: Recording) -> None:
+    """A base that answers late, and stamps whose jitter leaves room for it."""
+    recording, model = changed(clean, imu=late(clean.stream('imu'), -0.3),
+                               command=late(clean.stream('command'), -0.15)), load_model()
+    drives = drives_of([recording])
+    unknowns = loosened(base_unknowns(model.parameters, drives), dict.fromkeys(
+        ('delay_wheels', 'delay_imu', 'delay_pose'), 0.05))
+    start, (fault,) = begun_with(beginning(model.structure, unknowns, model.parameters, Reading()),
+                                 certain(found(recording)))
+    names = [u.name for u in start.unknowns]
+
+    def cost(**lateness: float) -> float:
+        places = np.array(start.places)
+        for name, seconds in lateness.items():
+            places[names.index(name)] = seconds
+        point = start.at(places)
+        return evidence.cost(evidence.residuals(evidence.predict(point)), point)
+    with ThreadPoolExecutor(1) as pool:
+        evidence = evidence_of(drives, ['clean'], start, first_guess(drives), pool)
+        others = {'delay_wheels': 0.15, 'delay_pose': 0.15}
+        # The same readings: the gyro is early against the others, or late as the base is.
+        assert cost(stamp_delay=-0.3, delay_imu=0.15, **others) < cost(
+            stamp_delay=-0.15, delay_imu=0.0, **others) - 10.0
+        fit = evidence.fit(start, rounds=20)
+    (finding,) = fault_findings([fault], fit)
+    assert finding.parameters[0].value == pytest.approx(-0.3, abs=0.05)
 
 
 def test_late_wheels_are_told_from_a_body_that_follows_its_wheels(clean: Recording) -> None:

@@ -42,7 +42,7 @@ def evened(times: FloatArray) -> FloatArray:
     Returns
     -------
     numpy.ndarray, shape (n,)
-        As they are where they do not tell which of an even series each is.
+        As they are where they do not tell which of an even series each is, or are even enough.
     """
     if times.size < int(setting('stamps_even')):
         return times
@@ -55,7 +55,7 @@ def evened(times: FloatArray) -> FloatArray:
     even = period * number + drift
     # Beyond half a period a stamp might be its neighbour's.
     sure = float(np.max(np.abs(times - even))) < 0.5 * period and np.all(np.diff(even) > 0.0)
-    return even if sure else times
+    return even if sure and np.std(times - even) > setting('stamp_digit') else times
 
 
 def _numbers(times: FloatArray, period: float) -> FloatArray:

@@ -11,6 +11,7 @@ refines their numbers with the rest.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from lg_husky_sim.diagnosis.conclusion import estimates
 from lg_husky_sim.diagnosis.evidence.evidence import Fit
@@ -18,10 +19,11 @@ from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.result import Estimate, Finding
 from lg_husky_sim.diagnosis.sensors.faults import Fault
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import in_words
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.network import on_side
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 #: What the statement of such a fault ends in.
 UNMODELLED = 'No model of the robot is needed to see it.'
@@ -72,8 +74,20 @@ def begun_with(start: Point, found: Sequence[Fault]) -> tuple[Point, tuple[Fault
             start = Hypothesis(fault.effect, (numbers,)).point(start, numbers)
         except ParameterError:
             continue
+        if fault.number.unit == 's':
+            start = _expected(start, fault.number)
         put.append(fault)
     return start, tuple(put)
+
+
+def _expected(point: Point, number: Estimate) -> Point:
+    # How late one stream is against the others is what the streams say. What all are late, which
+    # a base that answers late may bring about, would go into it otherwise.
+    known = (number.high - number.low) / (2.0 * float(ndtri(0.975)))
+    spread = max(known, setting('stamp_offset'))
+    return replace(point, unknowns=tuple(
+        replace(u, centre=number.value, deviation=spread) if u.name == number.name else u
+        for u in point.unknowns))
 
 
 def fault_findings(found: Sequence[Fault], fit: Fit | None = None) -> tuple[Finding, ...]:
