@@ -105,6 +105,8 @@ class EffectParameter:
         Whether it is estimated on a linear scale though it has one sign only.
     jitter : mapping of str to str
         Of a delay: which jitter of a log it may come of, by the effect's shape.
+    delays : mapping of str to str
+        Of a delay that is always there: that of a log which does the same, by the effect's shape.
     """
 
     name: str
@@ -119,6 +121,7 @@ class EffectParameter:
     shapes: tuple[str, ...] = ()
     linear: bool = False
     jitter: Mapping[str, str] = field(default_factory=dict)
+    delays: Mapping[str, str] = field(default_factory=dict)
 
     def parameter(self, value: float | None = None) -> Parameter:
         """Return it as a parameter with ``value``, or with its first start."""
@@ -306,7 +309,8 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
                         tuple(float(s) for s in p['starts']), str(p['source']),
                         bool(p.get('fixed', False)), float(p.get('negligible', 0.0)),
                         float(p.get('none_from', math.inf)), tuple(p.get('shapes', ())),
-                        bool(p.get('linear', False)), dict(p.get('jitter', {})))
+                        bool(p.get('linear', False)), dict(p.get('jitter', {})),
+                        dict(p.get('delays', {})))
         for key, p in entry['parameters'].items())
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),

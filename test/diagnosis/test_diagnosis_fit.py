@@ -12,7 +12,7 @@ from lg_husky_sim.diagnosis.conclusion import estimates
 from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of
-from lg_husky_sim.diagnosis.evidence.noise import first_guess, sensor_variance
+from lg_husky_sim.diagnosis.evidence.noise import first_guess, Noise, sensor_variance
 from lg_husky_sim.diagnosis.evidence.observation import (
     APART,
     observe,
@@ -22,8 +22,8 @@ from lg_husky_sim.diagnosis.evidence.observation import (
 )
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
-from lg_husky_sim.diagnosis.selection.rounds import calibrated, forward_step
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses, Hypothesis
+from lg_husky_sim.diagnosis.selection.rounds import calibrated, forward_step, with_jitter
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
@@ -114,6 +114,43 @@ def test_derivatives_are_those_of_one_number_after_the_other(
                 continue
             np.testing.assert_array_equal(found[:, column], expected,
                                           start.unknowns[k].name)
+
+
+@pytest.mark.parametrize(('effect', 'number', 'delay', 'stream'), [
+    (Effect('command_latency'), 'latency', 'command_delay', 'command'),
+    (Effect('sensor_time_offset', 'none', 'imu'), 'stamp_delay', 'delay_imu', 'imu'),
+    (Effect('sensor_time_offset', 'none', 'pose'), 'stamp_delay', 'delay_pose', 'pose')])
+def test_an_effect_that_is_a_delay_takes_all_of_it(
+        effect: Effect, number: str, delay: str, stream: str, drive: Callable[..., Recording]
+        ) -> None:
+    """Whoever had it first, and though jitter leaves room for it in how the log was made."""
+    recording, model = drive('ahead', 'nothing', 1), load_model()
+    logged, later = recording.stream(stream), -0.03 if stream == 'command' else 0.03
+    drives = drives_of([replace(recording, streams={
+        **recording.streams, stream: replace(logged, times=logged.times + later)})])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with ThreadPoolExecutor(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        evidence, fit = calibrated(evidence, start, 1)
+        evidence = Evidence(drives, evidence.names, Noise({
+            **evidence.noise.values, f'{stream}_jitter': 0.006}), evidence.whiteners, pool)
+        loose = with_jitter(fit.point, evidence)
+        sizes = {number: 0.02}
+        with_it = with_jitter(Hypothesis(effect, (sizes,)).point(loose, sizes), evidence)
+        names = [u.name for u in with_it.unknowns]
+        own, log = names.index(number), names.index(delay)
+        assert with_it.unknowns[log].deviation < loose.unknowns[log].deviation
+        column = evidence.derivatives(with_it, evidence.predict(with_it), [own, log])[0]
+        slope = sizes[number] if with_it.unknowns[own].logarithmic else 1.0
+        np.testing.assert_array_equal(column[:, 0], slope * column[:, 1])
+        # The log has as much of it as it may.
+        places = np.array(with_it.places)
+        places[log] = with_it.unknowns[log].upper
+        again = evidence.fit(with_it.at(places)).point
+    unknown = again.unknowns[log]
+    assert again.places[log] == pytest.approx(unknown.centre, abs=0.5 * unknown.deviation)
+    assert again.values[number] == pytest.approx(0.03, abs=0.006)
 
 
 def test_only_the_sum_of_what_commands_and_readings_are_late_counts(

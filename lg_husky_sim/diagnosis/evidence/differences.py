@@ -5,7 +5,8 @@ Derivatives of predicted readings by the unknowns, by finite differences of simu
 
 Numbers of the log that move readings of different sensors share a simulation. Of what commands and
 readings are late only the sum counts: derivatives by lags of the commands are the sums of those by
-the delays of the sensors, since finite differences would tell them apart by their errors.
+the delays of the sensors, and derivatives by effects that are such delays are those by them, since
+finite differences would tell them apart by their errors.
 """
 
 from __future__ import annotations
@@ -55,9 +56,12 @@ class Differences:
         """
         names = {u.name: k for k, u in enumerate(point.unknowns) if u.kind == 'log'}
         acting = self._lags(names)
-        lags = acting.keys() & set(which)
+        alike = {k: names[same] for k, u in enumerate(point.unknowns)
+                 if k in which and u.kind == 'effect'
+                 and (same := point.delays.get(u.name, '')) in names}
+        lags = acting.keys() & {*which, *alike.values()}
         delays = [names[name] for name in APART[0] if name in names]
-        wanted = (set(which) - lags).union(delays if lags else ())
+        wanted = {*which, *alike.values()}.difference(alike, lags).union(delays if lags else ())
         together = [own for row in APART if len(own := [
             names[name] for name in row if names.get(name) in wanted]) > 1]
         alone = wanted.difference(*together)
@@ -67,6 +71,10 @@ class Differences:
         for k in lags:
             made[k] = [sum(parts) if on else np.zeros_like(parts[0]) for on, *parts in zip(
                 acting[k], *(made[delay] for delay in delays), strict=True)]
+        for k, delay in alike.items():
+            unknown = point.unknowns[k]
+            slope = unknown.value(point.places[k]) if unknown.logarithmic else 1.0
+            made[k] = [slope * part for part in made[delay]]
         return made
 
     def _lags(self, names: Mapping[str, int]) -> dict[int, list[bool]]:

@@ -65,6 +65,12 @@ class Point:
         return self.reading.replacing(values_of(self.unknowns, self.places, 'log'))
 
     @cached_property
+    def delays(self) -> dict[str, str]:
+        """Delays of the log that numbers of effects do the same as, by these numbers' names."""
+        return {p.name: p.delays[e.shape] for e in self.structure.effects
+                for p in e.parameters() if e.shape in p.delays and not e.late}
+
+    @cached_property
     def prior_residuals(self) -> FloatArray:
         """Distances of the unknowns from the centres of their priors, in deviations."""
         centre = np.array([u.centre for u in self.unknowns])

@@ -40,9 +40,9 @@ class Unknown:
         Bounds on that scale.
     step : float
         Step of a difference quotient on that scale.
-    own, room : float
-        Of a delay: its deviation, and how far its bounds are from the centre, if no stamp jitters
-        [s].
+    prompt, own, room : float
+        Of a delay: its centre, its deviation, and how far its bounds are from the centre, if no
+        stamp jitters [s].
     """
 
     name: str
@@ -53,6 +53,7 @@ class Unknown:
     lower: float
     upper: float
     step: float
+    prompt: float = 0.0
     own: float = 0.0
     room: float = 0.0
 
@@ -100,7 +101,7 @@ def delay_unknown(name: str, centre: float, deviation: float, period: float) -> 
     own = math.hypot(deviation, period / math.sqrt(12.0))
     room = 0.5 * period + setting('log_reach') * deviation
     return Unknown(name, 'log', False, centre, own, centre - room, centre + room,
-                   0.2 * deviation, own, room)
+                   0.2 * deviation, centre, own, room)
 
 
 def window_unknown(name: str, usual: float, longest: float) -> Unknown:
@@ -191,10 +192,12 @@ def tick_unknowns(drives: Sequence[Drive]) -> tuple[Unknown, ...]:
 
 def loosened(unknowns: Sequence[Unknown], jitter: Mapping[str, float]) -> tuple[Unknown, ...]:
     """
-    Return unknowns whose delays may be as large as the jitter of their stamps suggests.
+    Return unknowns whose delays are as large as the jitter of their stamps suggests.
 
-    A base that looks for commands at its own rate 1/T is late by T/2 on the mean and by T/sqrt(12)
-    more or less; a stamp that is given late now and then is so likewise.
+    What is late by anything from 0 to T, as commands are at a base that looks for them at its own
+    rate 1/T, varies by s = T/sqrt(12) and is late by T/2 = sqrt(3) s on the mean; what varies
+    about its stamp is not late at all. With either, and all between, alike, a jitter s makes a
+    delay later by sqrt(3)/2 s, with a standard deviation of s/2.
 
     Parameters
     ----------
@@ -209,10 +212,12 @@ def loosened(unknowns: Sequence[Unknown], jitter: Mapping[str, float]) -> tuple[
     found = []
     for one in unknowns:
         if one.kind == 'log' and one.name in jitter:
-            late = setting('late_by_jitter') * jitter[one.name]
-            reach = math.hypot(one.room, setting('log_reach') * late)
-            one = replace(one, deviation=math.hypot(one.own, late), lower=one.centre - reach,
-                          upper=one.centre + reach)
+            latest = setting('late_by_jitter') * jitter[one.name]
+            spread = latest / math.sqrt(12.0)
+            centre = one.prompt + 0.5 * latest
+            reach = math.hypot(one.room, setting('log_reach') * spread)
+            one = replace(one, centre=centre, deviation=math.hypot(one.own, spread),
+                          lower=centre - reach, upper=centre + reach)
         found.append(one)
     return tuple(found)
 

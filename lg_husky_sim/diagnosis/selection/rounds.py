@@ -105,11 +105,17 @@ def calibrated(evidence: Evidence, start: Point, times: int = 2) -> tuple[Eviden
 
 
 def with_jitter(point: Point, evidence: Evidence) -> Point:
-    """Return a point whose delays may be as large as the jitter of the stamps suggests."""
-    noise = evidence.noise.values
+    """
+    Return a point whose delays are as large as the jitter of the stamps suggests.
+
+    A delay that an effect of the point is there for is all of the effect: it is not to be shared
+    with how the log was made.
+    """
+    of = {'command_delay': 'command_jitter', 'delay_wheels': 'wheel_jitter',
+          'delay_imu': 'imu_jitter', 'delay_pose': 'pose_jitter'}
+    noise, told = evidence.noise.values, set(point.delays.values())
     unknowns = loosened(point.unknowns, {
-        'command_delay': noise['command_jitter'], 'delay_wheels': noise['wheel_jitter'],
-        'delay_imu': noise['imu_jitter'], 'delay_pose': noise['pose_jitter']})
+        name: 0.0 if name in told else noise[jitter] for name, jitter in of.items()})
     return replace(point, unknowns=unknowns).at(point.places)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from lg_husky_sim.diagnosis.evidence.base_clock import ticking
+from lg_husky_sim.diagnosis.evidence.base_clock import any_lateness, gain_by_chance, ticking
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -238,9 +238,10 @@ def _at_ticks(known: _Recalibrated, start: Point, progress: Progress) -> _Recali
     start = replace(start, unknowns=(*start.unknowns, *own),
                     places=np.append(start.places, start_of(own)))
     other = _recalibrated(evidence_of(drives, first.names, start, first.noise, first.pool), start)
-    before, after = (one.evidence.noise.values['command_jitter'] for one in (known, other))
-    gains = known.evidence.surprise(known.base) > other.evidence.surprise(other.base)
-    return other if gains and after ** 2 < setting('clock_left') * before ** 2 else None
+    # Ticks explain why some commands are later than others, not that all are late.
+    plain, ticked = (evidence.surprise(fit) for evidence, fit in (
+        calibrated(one.evidence, any_lateness(one.base.point), 1) for one in (known, other)))
+    return other if plain - ticked > gain_by_chance(drives) else None
 
 
 def _nominal(point: Point) -> Point:
