@@ -18,10 +18,12 @@ ROBOT: Final = (
     'wheel_inertia', 'dry_left', 'dry_right', 'viscous_left', 'viscous_right',
     'grip_along', 'grip_across', 'creep_speed', 'creep_share', 'rolling', 'yaw_damping',
     'mass', 'yaw_inertia', 'com_x', 'com_y', 'com_height', 'radius_left', 'radius_right',
-    'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak', 'reference_lag')
+    'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak', 'reference_lag',
+    'drag', 'pull', 'scrub', 'scrub_speed', 'dead_voltage', 'bus_resistance', 'droop_rate')
 #: Numbers that are not estimated, read behind them.
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
-                'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate', 'least_share')
+                'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate', 'least_share',
+                'scrub_rate', 'pull_speed')
 #: Columns of what is simulated: base_link's velocity, wheels, specific force at the centre.
 OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'accel_y')
 
@@ -56,9 +58,11 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     mass, turning, xc, yc, height = p[22], p[23], p[24], p[25], p[26]
     slope_x, slope_y, track = p[29], p[30], p[31]
     build = step / p[32]
-    wheelbase, resistance, emf, radius = p[35], p[36], p[37], p[38]
-    load_time, dry_speed, rolling_speed, gravity, rest_rate = p[39], p[40], p[41], p[42], p[43]
-    least_share = p[44]
+    drag, pull, scrub, scrub_speed = p[35], p[36], p[37], p[38]
+    dead, bus_resistance, droop = p[39], p[40], p[41]
+    wheelbase, resistance, emf, radius = p[42], p[43], p[44], p[45]
+    load_time, dry_speed, rolling_speed, gravity, rest_rate = p[46], p[47], p[48], p[49], p[50]
+    least_share, scrub_rate, pull_speed = p[51], p[52], p[53]
     kept = np.exp(-p[33] * step)
     follow = 1.0 - np.exp(-step / p[34])
     half, side = 0.5 * wheelbase, 0.5 * track
@@ -81,6 +85,8 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     keep = step / (step + load_time)
     a = np.zeros(2)
     fixed = np.zeros(2)
+    volts = np.zeros(2)
+    wanted = np.zeros(2)
     d = np.zeros(2)
     bristle = np.zeros((4, 2))
     soft = np.zeros(4)
@@ -109,11 +115,27 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
         left = min(max(left, least_share), 1.0 - least_share)
         # Chassis: [m v, m u, jz r] with the tyres' secant slopes c.
         a00 = m + rolling * mass * gravity / np.sqrt(v * v + rolling_speed * rolling_speed)
+        a00 += drag * abs(v)
         a01, a02, a11, a12 = 0.0, 0.0, m, 0.0
-        a22 = jz + yaw_damping
+        a22 = jz + yaw_damping + scrub_speed * abs(v) + scrub / np.sqrt(
+            r * r + scrub_rate * scrub_rate)
+        moving = v * v + side * side * r * r
         b0 = m * v + mass * r * u + mass * gx
         b1 = m * u - mass * r * v + mass * gy
-        b2 = jz * r
+        b2 = jz * r + pull * moving / (moving + pull_speed * pull_speed)
+        bus = 1.0
+        if not given:
+            for s in range(2):
+                turning_part = (-0.5 if s == 0 else 0.5) * turn_width * slow_w
+                wanted[s] = (speed_gain * slow_v + turning_part) / radius
+                volts[s] = kff * wanted[s] + kp * (wanted[s] - w[s]) + held[s]
+            # Both chopped from one supply, whose voltage their currents lower.
+            left_duty = min(max(volts[0] / v_max, -1.0), 1.0)
+            right_duty = min(max(volts[1] / v_max, -1.0), 1.0)
+            weak = bus_resistance / resistance
+            bus = (1.0 - droop * step * k + weak * emf * (
+                left_duty * w[0] + right_duty * w[1]) / v_max) / (
+                    1.0 + weak * (left_duty * left_duty + right_duty * right_duty))
         for s in range(2):
             y = (side if s == 0 else -side) - yc
             a[s] = 0.0
@@ -147,36 +169,35 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
                 b0 += push
                 b2 -= push * y
                 continue
-            turning_part = (-0.5 if s == 0 else 0.5) * turn_width * slow_w
-            wanted = (speed_gain * slow_v + turning_part) / radius
-            error = wanted - w[s]
-            volts = kff * wanted + kp * error + held[s]
+            error = wanted[s] - w[s]
             loss = viscous[s] + dry[s] / np.sqrt(w[s] * w[s] + dry_speed * dry_speed)
             d[s] = inertia / step + loss + radii[s] * radii[s] * a[s]
             nw[s] = inertia / step * w[s] + radii[s] * fixed[s]
-            clipped = min(max(volts, -v_max), v_max)
-            amps = (clipped - emf * w[s]) / resistance
+            clipped = min(max(volts[s], -v_max), v_max)
+            lost = min(max(clipped, -dead), dead)
+            amps = (bus * (clipped - lost) - emf * w[s]) / resistance
             if abs(amps) > i_max:
                 nw[s] += emf * (i_max if amps > 0.0 else -i_max)
             else:
                 d[s] += volt_per_amp * emf
-                if clipped == volts:
-                    d[s] += volt_per_amp * kp
-                    nw[s] += volt_per_amp * (kff * wanted + kp * wanted + held[s])
+                if clipped == volts[s]:
+                    d[s] += volt_per_amp * bus * kp
+                    nw[s] += volt_per_amp * bus * (
+                        (kff + kp) * wanted[s] + held[s] - lost)
                 else:
-                    nw[s] += volt_per_amp * clipped
-            if clipped == volts and abs(amps) <= i_max:
+                    nw[s] += volt_per_amp * bus * (clipped - lost)
+            if clipped == volts[s] and abs(amps) <= i_max:
                 held[s] += ki * error * step
-            if abs(wanted) < rest_rate:
+            if abs(wanted[s]) < rest_rate:
                 held[s] *= kept
             # Wheel eliminated: w' = (nw + R a (v' - r' y)) / d.
             g = radii[s] * a[s]
             b0 += g * nw[s] / d[s]
             b2 -= y * g * nw[s] / d[s]
-            lost = g * g / d[s]
-            a00 -= lost
-            a02 += lost * y
-            a22 -= lost * y * y
+            carried = g * g / d[s]
+            a00 -= carried
+            a02 += carried * y
+            a22 -= carried * y * y
         # Symmetric 3x3.
         k00 = a11 * a22 - a12 * a12
         k01 = a02 * a12 - a01 * a22

@@ -31,7 +31,7 @@ class Candidate:
     parameters : tuple of str
         Those that differ.
     gain : float
-        Log evidence over that of no change [nats].
+        Log evidence over that of no change but those adopted [nats].
     before, shift : numpy.ndarray, shape (k,)
         Its parameters before, and what differs, on the scale of the estimates.
     sd : numpy.ndarray, shape (k,)
@@ -63,6 +63,8 @@ class Block:
     noise : Noise
     candidates : tuple of Candidate
         By gain, the largest first; with the wheels as measured, those of the body only.
+    explained : float
+        Log evidence of what is adopted over that of no change [nats].
     anything : float
         Log evidence of everything being different over that of no change [nats].
     chance : float
@@ -74,13 +76,15 @@ class Block:
     after: FloatArray
     noise: Noise
     candidates: tuple[Candidate, ...]
+    explained: float
     anything: float
     chance: float
 
 
-def compare(fits: RecordingFits, later: Collection[str]) -> Block:
+def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Change] = ()
+            ) -> Block:
     """
-    Weigh every change, and how probable its gain is where nothing has changed.
+    Weigh every change, and how probable its gain is where no more has changed than is adopted.
 
     The fits do not know which recordings are of which set. So a gain is held against those of the
     same recordings parted in any other way into two sets of these sizes, once what is claimed to
@@ -92,25 +96,27 @@ def compare(fits: RecordingFits, later: Collection[str]) -> Block:
     fits : RecordingFits
     later : collection of str
         Names of the recordings after the change.
+    adopted : sequence of Change
+        What differs anyway: the parameters of these differ under every hypothesis.
 
     Returns
     -------
     Block
     """
-    comparison = _Comparison(fits)
+    comparison = _Comparison(fits, adopted)
     numbers, n = comparison.numbers, comparison.index.size
     evidence = comparison.evidence(comparison.quadratics, later)
     candidates = comparison.candidates(evidence)
     every = evidence.solve(comparison.everything)
     anything = every.evidence - evidence.nothing
-    best, all_of_it = np.zeros(n), np.zeros(n)
-    best[comparison.places(candidates[0].parameters)] = candidates[0].shift
+    all_of_it = np.zeros(n)
     all_of_it[comparison.everything] = every.shift
     gains, wholes = [], []
+    best = comparison.shift(evidence, candidates[0].parameters) if candidates else np.zeros(n)
     for way in partitions([q.recording for q in fits.quadratics], later,
                           int(numbers['partitions']), int(numbers['partitions_listed'])):
-        gains.append(comparison.candidates(comparison.evidence(
-            comparison.without(best, later), way))[0].gain)
+        weighed = comparison.candidates(comparison.evidence(comparison.without(best, later), way))
+        gains.append(weighed[0].gain if weighed else 0.0)
         other = comparison.evidence(comparison.without(all_of_it, later), way)
         wholes.append(other.solve(comparison.everything).evidence - other.nothing)
     before = np.array(fits.prior.mean)
@@ -121,7 +127,8 @@ def compare(fits: RecordingFits, later: Collection[str]) -> Block:
     return Block(
         fits.base, np.clip(before, *bounds), np.clip(after, *bounds), fits.noise,
         tuple(replace(one, chance=exchange_chance(one.gain, gains, numbers))
-              for one in candidates), anything, exchange_chance(anything, wholes, numbers))
+              for one in candidates), comparison.explained(evidence), anything,
+        exchange_chance(anything, wholes, numbers))
 
 
 def partitions(names: Sequence[str], later: Collection[str], most: int, listed: int
@@ -168,7 +175,7 @@ def partitions(names: Sequence[str], later: Collection[str], most: int, listed: 
 class _Comparison:
     """The recordings' quadratics in the parameters that are free, and the changes of them."""
 
-    def __init__(self, fits: RecordingFits) -> None:
+    def __init__(self, fits: RecordingFits, adopted: Sequence[Change]) -> None:
         self.fits = fits
         self.numbers = fits.base.settings.decision
         self.index = np.flatnonzero(fits.prior.free)
@@ -178,10 +185,29 @@ class _Comparison:
         # Delays of all streams are none: that of the reference is left out where all may differ.
         self.everything = np.array([i for i, k in enumerate(self.index)
                                     if k != fits.base.reference], dtype=np.intp)
+        self._adopted = tuple(dict.fromkeys(
+            name for change in adopted for name in self._names(change)))
+
+    def _names(self, change: Change) -> tuple[str, ...]:
+        # Of the parameters that differ by a change and are free here.
+        more = () if self.fits.base.given else change.more
+        return tuple(name for name in (*change.parameters, *more, *change.aside)
+                     if name in self._place)
 
     def places(self, names: Sequence[str]) -> NDArray[np.intp]:
         """Return where parameters of these names are."""
         return np.array([self._place[name] for name in names], dtype=np.intp)
+
+    def explained(self, evidence: Evidence) -> float:
+        """Return what the changes that are adopted gain together [nats]."""
+        return evidence.solve(self.places(self._adopted)).evidence - evidence.nothing
+
+    def shift(self, evidence: Evidence, names: Sequence[str]) -> FloatArray:
+        """Return by how much all parameters differ where these and those adopted may."""
+        changed = self.places((*self._adopted, *names))
+        found = np.zeros(self.index.size)
+        found[changed] = evidence.solve(changed).shift
+        return found
 
     def without(self, shift: FloatArray, later: Collection[str]) -> list[Quadratic]:
         """Return the recordings with a shift taken out of the later ones."""
@@ -200,16 +226,20 @@ class _Comparison:
                 int(numbers['recording_rounds']), numbers['recording_free'])
 
     def candidates(self, evidence: Evidence) -> list[Candidate]:
-        """Return every change with its gain, the largest first; their chance is not known yet."""
-        base, found = self.fits.base, []
+        """
+        Return every change with its gain, the largest first; their chance is not known yet.
+
+        Of a change that shares parameters with what is adopted, only the others are weighed.
+        """
+        base, found, count = self.fits.base, [], len(self._adopted)
+        known = evidence.solve(self.places(self._adopted)).evidence
         for change in base.settings.changes:
-            if base.given and change.block != 'body':
+            names = tuple(name for name in self._names(change) if name not in self._adopted)
+            if (base.given and change.block != 'body') or not names:
                 continue
-            more = () if base.given else change.more
-            names = (*change.parameters, *more, *change.aside)
-            changed = self.places(names)
+            changed = self.places((*self._adopted, *names))
             solved = evidence.solve(changed)
             found.append(Candidate(
-                change, names, solved.evidence - evidence.nothing, solved.shared[changed],
-                solved.shift, np.sqrt(np.diag(solved.covariance)), 1.0))
+                change, names, solved.evidence - known, solved.shared[changed[count:]],
+                solved.shift[count:], np.sqrt(np.diag(solved.covariance)[count:]), 1.0))
         return sorted(found, key=lambda one: -one.gain)

@@ -59,39 +59,49 @@ def statement(one: Candidate, settings: Settings) -> str:
     return f'{one.change.title[0].upper()}{one.change.title[1:]}: {"; ".join(parts)}.'
 
 
-def finding(decision: Decision, settings: Settings, share: float) -> Finding | None:
-    """Return what is named as a finding."""
+def findings(decisions: Sequence[Decision], settings: Settings) -> tuple[Finding, ...]:
+    """Return what is claimed, one finding a change."""
+    total = sum(one.gain for one in decisions)
+    return tuple(_finding(one, settings, one.gain / total) for one in decisions if one.gain > 0.0)
+
+
+def _finding(decision: Decision, settings: Settings, share: float) -> Finding:
     named = decision.named
     rivals = tuple(Rivalry(one.change.effect, one.change.side, one.gain)
                    for one in decision.rivals)
-    if decision.unknown:
+    if named is None:
         near = decision.rivals[0].change if decision.rivals else None
         return Finding('unknown', 'none', near.subsystem if near else 'drivetrain',
                        near.elements if near else (), near.regime if near else '', None, (),
                        decision.unknown, decision.chance, share, rivals,
                        'Something has changed that is none of the known changes: the later '
                        'recordings need other parameters than the earlier ones.')
-    if named is None:
-        return None
     change = named.change
-    sign = next((one.value for one in estimates(named, settings) if one.name == 'gyro_factor'),
-                1.0)
-    effect = 'gyro_sign' if sign < 0.0 else change.effect
-    return Finding(effect, change.side, change.subsystem, change.elements, change.regime,
+    effect, side = change.effect, change.side
+    for one in estimates(named, settings):
+        if one.name == 'gyro_factor' and one.value < 0.0:
+            effect = 'gyro_sign'
+        if one.name == 'pull':
+            side = 'left' if one.value > 0.0 else 'right'
+    return Finding(effect, side, change.subsystem, change.elements, change.regime,
                    None, estimates(named, settings), named.gain, decision.chance, share, rivals,
                    statement(named, settings))
 
 
-def not_told_apart(decision: Decision, settings: Settings) -> tuple[Indistinguishable, ...]:
+def not_told_apart(decisions: Sequence[Decision], settings: Settings
+                   ) -> tuple[Indistinguishable, ...]:
     """Return the names that the data leave open, and the sensors and drives that would tell."""
-    if len(decision.tied) < 2:
-        return ()
-    effects = decision.tied[:int(settings.decision['group'])]
-    named = [s for s in settings.separations if s.effects & set(effects)]
-    closest = sorted(named, key=lambda s: -len(s.effects & set(effects)))[:2]
-    return (Indistinguishable(
-        effects, tuple(dict.fromkeys(x for s in closest for x in s.sensors)),
-        tuple(dict.fromkeys(x for s in closest for x in s.drives))),)
+    found: dict[Indistinguishable, None] = {}
+    for decision in decisions:
+        if len(decision.tied) < 2:
+            continue
+        effects = decision.tied[:int(settings.decision['group'])]
+        named = [s for s in settings.separations if s.effects & set(effects)]
+        closest = sorted(named, key=lambda s: -len(s.effects & set(effects)))[:2]
+        found[Indistinguishable(
+            effects, tuple(dict.fromkeys(x for s in closest for x in s.sensors)),
+            tuple(dict.fromkeys(x for s in closest for x in s.drives)))] = None
+    return tuple(found)
 
 
 def mismatches(block: Block, after: Sequence[Drive], decision: Decision, settings: Settings

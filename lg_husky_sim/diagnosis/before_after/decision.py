@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which change is named, how surely, and what it cannot be told from."""
+"""Which one change is named, how surely, and what it cannot be told from."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import math
 
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
 from lg_husky_sim.diagnosis.before_after.judge import is_beyond_chance
-from lg_husky_sim.diagnosis.before_after.settings import Settings
+from lg_husky_sim.diagnosis.before_after.settings import Change, Settings
 import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
 class Decision:
     """
-    The answer.
+    What is said of one change.
 
     Parameters
     ----------
@@ -40,6 +40,11 @@ class Decision:
     confidence: float
     unknown: float = 0.0
     chance: float = float('nan')
+
+    @property
+    def gain(self) -> float:
+        """Of what is claimed [nats]; 0 where nothing is."""
+        return self.unknown if self.named is None else self.named.gain
 
 
 def named_by(body: Sequence[Candidate], whole: Sequence[Candidate],
@@ -98,7 +103,7 @@ def _simplest(candidates: Sequence[Candidate], numbers: Mapping[str, float]) -> 
 
 def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
     """
-    Decide from what both blocks say.
+    Decide from what both blocks say which change is claimed, if any.
 
     Parameters
     ----------
@@ -111,37 +116,80 @@ def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
     -------
     Decision
     """
-    blocks = [block for block in (body, loop) if block is not None]
-    # The accepted rate is that of all blocks looked at together (Bonferroni).
-    rate = settings.decision['false_alarm_rate'] / len(blocks)
-    numbers = {**settings.decision, 'false_alarm_rate': rate}
+    numbers = _shared(body, settings)
     bodily = () if body is None else body.candidates
     named = named_by(bodily, loop.candidates, numbers)
+    if named is not None:
+        return _claimed(named, bodily if named in bodily else loop.candidates, settings, numbers)
     everything = sorted((*bodily, *loop.candidates), key=lambda one: -one.gain)
+    least = min((one.chance for one in everything if one.gain > 0.0), default=1.0)
+    doubt = numbers['sure_doubt'] * min(float(
+        np.log(max(least, 1e-300)) / np.log(numbers['false_alarm_rate'])), 1.0)
+    return Decision(None, _best_of_names(everything, ''), (),
+                    _bounded(numbers['sure_nothing'] - doubt, numbers))
+
+
+def claim(change: Change, body: Block | None, loop: Block, settings: Settings) -> Decision | None:
+    """Return the claim of a certain change, if one of the blocks makes it beyond chance."""
+    numbers = _shared(body, settings)
+    for block in (body, loop):
+        candidates = () if block is None else block.candidates
+        for one in candidates:
+            if one.change == change and is_beyond_chance(one, numbers):
+                return _claimed(one, candidates, settings, numbers)
+    return None
+
+
+def unnamed(body: Block | None, loop: Block, explained: float, settings: Settings
+            ) -> Decision | None:
+    """
+    Return that something changed which has no name, if that is so.
+
+    Parameters
+    ----------
+    body : Block or None
+    loop : Block
+    explained : float
+        What the claimed changes gain together [nats]; 0 where none is.
+    settings : Settings
+
+    Returns
+    -------
+    Decision or None
+        None where there is no difference beyond chance, or what is claimed explains enough of it.
+    """
+    numbers = _shared(body, settings)
+    blocks = [block for block in (body, loop) if block is not None]
     surest = min(blocks, key=lambda block: block.chance if block.anything > 0.0 else 1.0)
-    gained = 0.0 if named is None else max(
-        one.gain for one in (named, *loop.candidates) if one.change is named.change)
-    if surest.anything > 0.0 and surest.chance < rate and (
-            gained < numbers['unknown_share'] * surest.anything):
-        margin = 1.0 - gained / surest.anything
-        return Decision(None, _best_of_names(everything, ''), (),
-                        _bounded(_odds(surest.chance, margin, numbers), numbers),
-                        surest.anything, surest.chance)
-    if named is None:
-        least = min((one.chance for one in everything if one.gain > 0.0), default=1.0)
-        doubt = numbers['sure_doubt'] * min(float(np.log(max(least, 1e-300)) / np.log(rate)), 1.0)
-        return Decision(None, _best_of_names(everything, ''), (),
-                        _bounded(numbers['sure_nothing'] - doubt, numbers))
-    block = bodily if named in bodily else loop.candidates
+    if surest.anything <= 0.0 or surest.chance >= numbers['false_alarm_rate'] or (
+            explained >= numbers['unknown_share'] * surest.anything):
+        return None
+    everything = sorted((one for block in blocks for one in block.candidates),
+                        key=lambda one: -one.gain)
+    margin = 1.0 - explained / surest.anything
+    return Decision(None, _best_of_names(everything, ''), (),
+                    _bounded(_odds(surest.chance, margin, numbers), numbers),
+                    surest.anything, surest.chance)
+
+
+def _shared(body: Block | None, settings: Settings) -> dict[str, float]:
+    # The accepted rate is that of all blocks looked at together (Bonferroni).
+    rate = settings.decision['false_alarm_rate'] / (1 if body is None else 2)
+    return {**settings.decision, 'false_alarm_rate': rate}
+
+
+def _claimed(named: Candidate, block: Sequence[Candidate], settings: Settings,
+             numbers: Mapping[str, float]) -> Decision:
     rivals = _best_of_names(block, named.change.effect)
     second = max(rivals[0].gain, 0.0) if rivals else 0.0
     margin = float(np.clip(1.0 - second / named.gain, 0.0, 1.0))
-    odds = _odds(named.chance, margin, numbers)
     alike = [one.change.effect for one in rivals if is_beyond_chance(one, numbers) and (
         named.gain - one.gain < max(numbers['tie'], numbers['near'] * named.gain))]
     alike += settings.aliases.get(named.change.effect, ())
     tied = (named.change.effect, *dict.fromkeys(alike)) if alike else ()
-    return Decision(named, rivals, tied, _bounded(odds, numbers), chance=named.chance)
+    return Decision(named, rivals, tied,
+                    _bounded(_odds(named.chance, margin, numbers), numbers),
+                    chance=named.chance)
 
 
 def _odds(chance: float, margin: float, numbers: Mapping[str, float]) -> float:

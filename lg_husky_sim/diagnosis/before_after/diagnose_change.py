@@ -6,17 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-import math
 
 from lg_husky_sim.diagnosis.before_after.comparison import Block, compare
-from lg_husky_sim.diagnosis.before_after.conclusion import finding, mismatches, not_told_apart
-from lg_husky_sim.diagnosis.before_after.decision import decide, Decision
+from lg_husky_sim.diagnosis.before_after.conclusion import findings, mismatches, not_told_apart
+from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.drives import all_drives, Drive
 from lg_husky_sim.diagnosis.before_after.fitting import threads
-from lg_husky_sim.diagnosis.before_after.prediction import base_of, residual
+from lg_husky_sim.diagnosis.before_after.lags import lags_of
+from lg_husky_sim.diagnosis.before_after.prediction import base_of
 from lg_husky_sim.diagnosis.before_after.recording_fits import at_the_edge, fit_recordings
-from lg_husky_sim.diagnosis.before_after.runnable import carried, fitted, started
-from lg_husky_sim.diagnosis.before_after.settings import Settings, settings
+from lg_husky_sim.diagnosis.before_after.runnable import carried, fitted, having, started
+from lg_husky_sim.diagnosis.before_after.selection import remembered, select, Selection
+from lg_husky_sim.diagnosis.before_after.settings import Change, Settings, settings
 from lg_husky_sim.diagnosis.held_out import errors, split
 from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
 from lg_husky_sim.errors import RecordingError
@@ -38,7 +39,8 @@ class ChangeCase:
     Parameters
     ----------
     diagnosis : Diagnosis
-    decision : Decision
+    decisions : tuple of Decision
+        One a change, or a single one of none or an unknown one.
     body, loop : Block or None
         The base fitted to both sets, with the wheels as measured and without.
     segments : tuple of Segment
@@ -48,7 +50,7 @@ class ChangeCase:
     """
 
     diagnosis: Diagnosis
-    decision: Decision
+    decisions: tuple[Decision, ...]
     body: Block | None
     loop: Block
     segments: tuple[Segment, ...]
@@ -90,34 +92,40 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
     known = settings()
     before, after = _drives(baseline, known), _drives(recordings, known)
     later = frozenset(drive.recording for drive in after)
-    body = None
+    moved = None
     with threads(jobs) as pool:
         intervals = [float(np.median(np.diff(d.wheels.times))) for d in (*before, *after)
                      if d.wheels.times.size > 1]
         streams = frozenset.intersection(*(frozenset(d.bins) for d in (*before, *after)))
         base = at_the_edge(base_of(known, nominal.parameters, True, max(intervals, default=0.0),
                                    streams), (*before, *after))
+        base, lags = lags_of(recordings, baseline, base)
         begin = base.start
         if all(_shows_the_body(drive) for drive in (*before, *after)):
-            fits = fit_recordings(base, (*before, *after), begin, pool, lambda share: progress(
-                'motion of the body', 0.02 + 0.28 * share))
-            body, begin = compare(fits, later), fits.common
-        loop = compare(fit_recordings(
-            replace(base, given=False), (*before, *after), begin, pool,
-            lambda share: progress('wheel loop and body', 0.3 + 0.5 * share)), later)
-    decision = decide(body, loop, known)
+            moved = fit_recordings(base, (*before, *after), lags, begin, pool, lambda share: (
+                progress('motion of the body', 0.02 + 0.28 * share)))
+            begin = moved.common
+        looped = fit_recordings(
+            replace(base, given=False), (*before, *after), lags, begin, pool,
+            lambda share: progress('wheel loop and body', 0.3 + 0.45 * share))
+
+        def compared(adopted: Sequence[Change]) -> tuple[Block | None, Block]:
+            return (None if moved is None else compare(moved, later, adopted),
+                    compare(looped, later, adopted))
+        progress('several changes', 0.75)
+        found = select(remembered(compared), known)
     progress('model', 0.8)
     parts, others = (tuple(s for r in rs for s in segments(r)) for rs in (recordings, baseline))
-    return ChangeCase(_diagnosis(decision, body, loop, after, others, parts, nominal, known,
-                                 progress, _notes((*baseline, *recordings))),
-                      decision, body, loop, parts, nominal)
+    return ChangeCase(_diagnosis(found, after, others, parts, nominal, known, progress,
+                                 _notes((*baseline, *recordings))),
+                      found.decisions, found.body, found.loop, parts, nominal)
 
 
 def _drives(recordings: Sequence[Recording], known: Settings) -> tuple[Drive, ...]:
     found: list[Drive] = []
     for recording in recordings:
         drives = all_drives([recording], known.simulation['step'], known.bins,
-                            known.fit['settle'], known.fit['shortest'])
+                            known.fit['settle'], known.fit['shortest'], known.fit['early'])
         if not drives:
             raise RecordingError(
                 f'recording {recording.name} has no stretch of {known.fit["shortest"]:g} s '
@@ -130,11 +138,11 @@ def _shows_the_body(drive: Drive) -> bool:
     return 'wheels' in drive.bins and len(drive.bins) > 1
 
 
-def _diagnosis(decision: Decision, body: Block | None, loop: Block, after: Sequence[Drive],
-               earlier: Sequence[Segment], later: Sequence[Segment], nominal: ModelFile,
-               known: Settings, progress: Progress, notes: Sequence[str]) -> Diagnosis:
-    named = decision.named
-    found = finding(decision, known, _share(decision, body, loop, after))
+def _diagnosis(selection: Selection, after: Sequence[Drive], earlier: Sequence[Segment],
+               later: Sequence[Segment], nominal: ModelFile, known: Settings, progress: Progress,
+               notes: Sequence[str]) -> Diagnosis:
+    first, loop = selection.decisions[0], selection.loop
+    named, found = first.named, findings(selection.decisions, known)
     about = 'robot before the change, by lg_husky diagnose'
     steps = int(known.fit['evaluations'])
     names = loop.base.names
@@ -146,36 +154,25 @@ def _diagnosis(decision: Decision, body: Block | None, loop: Block, after: Seque
     progress('model', 0.87)
     train, test = split(later)
     model = half = plain
-    if found is not None:
+    if found:
+        changed = {one.name: one.value for finding in found for one in finding.parameters}
         new = carried(new, old, plain)
-        model = fitted([plain, new], later, steps, found.statement)
+        options = [having(one, changed, known) for one in (plain, new)]
+        model = fitted(options, later, steps, ' '.join(one.statement for one in found))
         progress('model', 0.91)
-        half = fitted([plain, new], train, steps, about)
-    shown = body if named is not None and named.change.block == 'body' and body else loop
+        half = fitted(options, train, steps, about)
+    shown = None if named is None or named.change.block == 'loop' else selection.body
     return Diagnosis(
-        Verdict.NOTHING_MISSING if found is None else (
-            Verdict.UNKNOWN if decision.unknown else Verdict.KNOWN), decision.confidence,
-        () if found is None else (found,), not_told_apart(decision, known),
-        mismatches(shown, after, decision, known), (),
+        Verdict.NOTHING_MISSING if not found else (
+            Verdict.UNKNOWN if first.unknown else Verdict.KNOWN), first.confidence,
+        found, not_told_apart(selection.decisions, known),
+        mismatches(shown or loop, after, first, known), (),
         _errors(plain, later), _errors(model, later), _errors(plain, test), _errors(half, test),
-        _remaining(decision), model, plain, tuple(notes))
+        _remaining(first), model, plain, tuple(notes))
 
 
 def _errors(model: ModelFile, parts: Sequence[Segment]) -> dict[str, float]:
     return errors(compile_model(model.structure).at(model.parameters), parts)
-
-
-def _share(decision: Decision, body: Block | None, loop: Block, after: Sequence[Drive]
-           ) -> float:
-    # Of the sum of squares in which the later drives are off the base before.
-    if decision.named is None:
-        return math.nan
-    block = body if decision.named.change.block == 'body' and body is not None else loop
-
-    def total(z: FloatArray) -> float:
-        return sum(float(e @ e) for e in (
-            block.noise.white(residual(block.base, drive, z)) for drive in after))
-    return float(np.clip(1.0 - total(block.after) / total(block.before), 0.0, 1.0))
 
 
 def _remaining(decision: Decision) -> str:

@@ -103,7 +103,7 @@ def _binned(times: FloatArray, values: FloatArray, start: float, width: float) -
 
 
 def drives(recording: Recording, step: float, widths: Mapping[str, float], settle: float,
-           shortest: float) -> tuple[Drive, ...]:
+           shortest: float, early: float = 0.0) -> tuple[Drive, ...]:
     """
     Cut a recording at its gaps and bin its samples.
 
@@ -118,6 +118,8 @@ def drives(recording: Recording, step: float, widths: Mapping[str, float], settl
         Left out at the start of each stretch, whose state is not known [s].
     shortest : float
         Shortest stretch that is used [s].
+    early : float
+        Left out at the end of each stretch, by as much as a stream may be early [s].
 
     Returns
     -------
@@ -131,12 +133,12 @@ def drives(recording: Recording, step: float, widths: Mapping[str, float], settl
         if part.duration < shortest:
             continue
         found.append(_drive(part.recording, part.start, part.end, part.streams, step, widths,
-                            settle))
+                            settle, early))
     return tuple(found)
 
 
 def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries], step: float,
-           widths: Mapping[str, float], settle: float) -> Drive:
+           widths: Mapping[str, float], settle: float, early: float) -> Drive:
     steps = int(np.floor((end - start) / step))
     middle = start + step * (np.arange(steps) + 0.5)
     command = streams['command']
@@ -146,8 +148,9 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
     bins: dict[str, Bins] = {}
 
     def binned(stream: str, values: FloatArray, kind: str) -> None:
-        later = streams[stream].times >= start + settle
-        bins[stream] = _binned(streams[stream].times[later], values[later], start, widths[kind])
+        times = streams[stream].times
+        kept = (times >= start + settle) & (times <= end - early)
+        bins[stream] = _binned(times[kept], values[kept], start, widths[kind])
 
     begin = np.zeros(5)
     gyro = np.zeros((0, 2))
@@ -183,6 +186,7 @@ def mean_command(drive: Drive, step: float, delay: float) -> FloatArray:
 
 
 def all_drives(recordings: Sequence[Recording], step: float, widths: Mapping[str, float],
-               settle: float, shortest: float) -> tuple[Drive, ...]:
+               settle: float, shortest: float, early: float = 0.0) -> tuple[Drive, ...]:
     """Return the drives of several recordings, in order."""
-    return tuple(d for r in recordings for d in drives(r, step, widths, settle, shortest))
+    return tuple(d for r in recordings
+                 for d in drives(r, step, widths, settle, shortest, early))

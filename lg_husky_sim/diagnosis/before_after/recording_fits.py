@@ -17,7 +17,13 @@ from dataclasses import dataclass, replace
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, joined, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import cost_at, fit_set, Prior, SetFit
-from lg_husky_sim.diagnosis.before_after.prediction import Base, jacobian, residual
+from lg_husky_sim.diagnosis.before_after.prediction import (
+    Base,
+    CHANNELS,
+    jacobian,
+    measured,
+    residual,
+)
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise, Noise, noise_of
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -40,7 +46,7 @@ class RecordingFits:
         Of the parameters, without what is known of them by other recordings.
     noise : Noise
     common : numpy.ndarray, shape (n,)
-        Mean of the recordings, on the scale of the estimates.
+        Mean of the recordings, less what their streams are late, on the scale of the estimates.
     places : mapping of str to numpy.ndarray, shape (n,)
         Where each recording is likeliest.
     quadratics : tuple of Quadratic
@@ -55,19 +61,22 @@ class RecordingFits:
     quadratics: tuple[Quadratic, ...]
 
 
-def fit_recordings(base: Base, drives: Sequence[Drive], begin: FloatArray,
+def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: FloatArray,
                    pool: ThreadPoolExecutor, share: Share) -> RecordingFits:
     """
     Fit the base to each recording.
 
     The longest is fitted first, from every kind of robot; the others begin there, or where any
     start is likelier. Then all are fitted twice more, with a prior about their mean that is as
-    wide as a change, and each may begin where any other ended, or at a start from there.
+    wide as a change, and each may begin where any other ended, or at a start from there. Where it
+    begins, and what its delays are expected to be, differs by as much as its streams say.
 
     Parameters
     ----------
     base : Base
     drives : sequence of Drive
+    lags : mapping of str to numpy.ndarray, shape (n,)
+        By how much the streams of each recording are late, on the scale of the estimates.
     begin : numpy.ndarray, shape (n,)
         Where the fits begin.
     pool : ThreadPoolExecutor
@@ -81,21 +90,27 @@ def fit_recordings(base: Base, drives: Sequence[Drive], begin: FloatArray,
     numbers = base.settings.fit
     quantities = base.settings.quantities
     free = np.array([not base.given or q.name in base.settings.body for q in quantities])
-    prior = Prior(base.start, base.sd, free)
+    # What the nominal robot has not stays out of the fits, which it would lead astray: whether it
+    # has come to be there is told from the derivatives.
+    held = np.array([q.name in base.settings.runs_as for q in quantities])
+    every, prior = Prior(base.start, base.sd, free), Prior(base.start, base.sd, free & ~held)
     steps, enough, roughly = int(numbers['steps']), numbers['enough'], numbers['roughly']
-    noise = first_noise(base.settings)
+    noise = first_noise(base.settings).among(_moving(base, drives))
     groups: dict[str, list[Drive]] = {}
     for drive in drives:
         groups.setdefault(drive.recording, []).append(drive)
     longest = max(groups, key=lambda name: sum(d.steps for d in groups[name]))
     kinds = _kinds(base, prior, begin)
     firsts = list(pool.map(lambda start: fit_set(
-        base, groups[longest], prior, noise, start, steps, roughly, map), kinds))
+        base, groups[longest], replace(prior, mean=prior.mean + lags[longest]), noise,
+        start + lags[longest], steps, roughly, map), kinds))
     first = min(firsts, key=lambda fit: fit.cost).z
     share(0.2)
 
     def fitted(name: str, about: Prior, kinds: Sequence[Sequence[FloatArray]], until: float
                ) -> SetFit:
+        about = replace(about, mean=about.mean + lags[name])
+
         def cost(start: FloatArray) -> float:
             return cost_at(base, groups[name], about, noise, start, map)
 
@@ -107,37 +122,38 @@ def fit_recordings(base: Base, drives: Sequence[Drive], begin: FloatArray,
                     key=lambda one: one.cost)
         return fit(begun.z, steps)
     names = list(groups)
-    options = [[one] for one in (*kinds, *_shifted(base, free, first))]
+    options = [*kinds, *_shifted(base, free, first - lags[longest])]
     places = dict(zip(names, pool.map(lambda name: first if name == longest else fitted(
-        name, prior, options, roughly).z, names), strict=True))
+        name, prior, [[one + lags[name]] for one in options], roughly).z, names), strict=True))
     share(0.4)
-    noise = _renewed(base, groups, places)
+    noise = _renewed(base, groups, places).among(noise.sd)
     wide = np.array([np.hypot(q.recording, q.change) for q in quantities])
     # A delay of every stream is one of the commands: that of one stream is none in all recordings.
     wide[base.reference] = base.sd[base.reference]
     for turn, until in enumerate((roughly, enough)):
-        common = _mean(base, prior, wide, places, _quadratics(
-            base, groups, noise, prior, places, pool))
-        about = Prior(common, wide, free)
-        ends = [common, *places.values()]
-        # Of starts of a kind that begin at different ends, the likeliest.
-        others = [[one] for one in ends] if turn else list(zip(
-            *(_shifted(base, free, one) for one in ends), strict=True))
+        middle = _mean(base, prior, wide, places, _quadratics(
+            base, groups, noise, prior, places, pool)) - np.where(
+                free, np.mean(list(lags.values()), axis=0), 0.0)
+        about = Prior(middle, wide, prior.free)
+        ends = {'': middle, **{name: place - lags[name] for name, place in places.items()}}
 
-        def again(name: str, about: Prior = about,
-                  others: Sequence[Sequence[FloatArray]] = others, places: Places = places,
-                  until: float = until) -> FloatArray:
-            fits = [fitted(name, about, [[places[name]]], until), fitted(name, about, [
-                kind for kind in others if kind[0] is not places[name]], until)]
+        def again(name: str, about: Prior = about, ends: Places = ends, places: Places = places,
+                  until: float = until, turn: int = turn) -> FloatArray:
+            # Of starts of a kind that begin at different ends, the likeliest.
+            begins = [end + lags[name] for other, end in ends.items() if other != name or not turn]
+            others = [[one] for one in begins] if turn else list(zip(
+                *(_shifted(base, free, one) for one in begins), strict=True))
+            fits = [fitted(name, about, [[places[name]]], until),
+                    fitted(name, about, others, until)]
             return min(fits, key=lambda fit: fit.cost).z
         places = dict(zip(names, pool.map(again, names), strict=True))
         share(0.65 + 0.2 * turn)
         if not turn:
-            noise = _renewed(base, groups, places)
-    found = _quadratics(base, groups, noise, prior, places, pool)
+            noise = _renewed(base, groups, places).among(noise.sd)
+    found = _quadratics(base, groups, noise, every, places, pool)
     share(1.0)
-    return RecordingFits(base, prior, noise, common, places, tuple(
-        _with_limits(base, groups[one.recording], noise, prior, places, one) for one in found))
+    return RecordingFits(base, every, noise, middle, places, tuple(
+        _with_limits(base, groups[one.recording], noise, every, places, one) for one in found))
 
 
 def at_the_edge(base: Base, drives: Sequence[Drive]) -> Base:
@@ -163,6 +179,13 @@ def quadratic(base: Base, drive: Drive, noise: Noise, z: FloatArray, prior: Prio
     curvature, slope = j.T @ j, j.T @ e
     return Quadratic(drive.recording, False, curvature, curvature @ z - slope,
                      0.5 * float(e @ e) - float(z @ slope) + 0.5 * float(z @ curvature @ z))
+
+
+def _moving(base: Base, drives: Sequence[Drive]) -> set[str]:
+    # Channels that read more than one value: an IMU without an accelerometer reads zeros.
+    return {name for drive in drives for stream, rows in measured(base, drive).items()
+            for name, column in zip(CHANNELS[stream], rows.T, strict=True)
+            if column.size and np.ptp(column) > 0.0}
 
 
 def _kinds(base: Base, prior: Prior, begin: FloatArray) -> list[FloatArray]:

@@ -81,7 +81,19 @@ def started(nominal: ModelFile, base: Mapping[str, float], settings: Settings) -
     if max(abs(base['slope_x']), abs(base['slope_y'])) > settings.fit['slope_shows']:
         effects.append(Effect('slope'))
         values |= {name: -base['mass'] * base[name] for name in ('slope_x', 'slope_y')}
-    structure = nominal.structure
+    return _with(nominal, effects, values)
+
+
+def having(model: ModelFile, changed: Mapping[str, float], settings: Settings) -> ModelFile:
+    """Return a model with what the robot did not have before, by parameters of the base."""
+    brought = {name: settings.runs_as[name] for name in changed if name in settings.runs_as}
+    return _with(model, [Effect(effect) for effect, _ in brought.values()],
+                 {number: changed[name] for name, (_, number) in brought.items()})
+
+
+def _with(model: ModelFile, effects: Sequence[Effect], values: Mapping[str, float]) -> ModelFile:
+    # Effects that the model has already keep theirs, with these values.
+    structure, parameters = model.structure, model.parameters
     entries: list[Parameter] = []
     for effect in effects:
         if any(there.id == effect.id for there in structure.effects):
@@ -91,7 +103,7 @@ def started(nominal: ModelFile, base: Mapping[str, float], settings: Settings) -
     known = parameters.with_entries(*entries)
     inside = {name: float(np.clip(value, known.entry(name).lower, known.entry(name).upper))
               for name, value in values.items() if name in known}
-    return ModelFile(structure, known.replacing(inside), nominal.about)
+    return ModelFile(structure, known.replacing(inside), model.about)
 
 
 def carried(model: ModelFile, before: ModelFile, fit_before: ModelFile) -> ModelFile:

@@ -107,6 +107,10 @@ class Settings:
     simulation : mapping of str to float
     bins, noise : mapping of str to float
         Of each kind of channel: width of a bin [s], residual to begin with [unit].
+    runs_as : mapping of str to (str, str)
+        Effect and its number by which a model has a parameter of the base that changed.
+    not_told : mapping of str to str
+        Effects of the catalogue of which a change is not told, and why.
     """
 
     robot: tuple[Quantity, ...]
@@ -122,6 +126,8 @@ class Settings:
     decision: Mapping[str, float]
     changes: tuple[Change, ...]
     aliases: Mapping[str, tuple[str, ...]]
+    runs_as: Mapping[str, tuple[str, str]]
+    not_told: Mapping[str, str]
     separations: tuple[Separation, ...]
     advice: Mapping[str, tuple[str, ...]]
     names: Mapping[str, str]
@@ -208,6 +214,9 @@ def settings() -> Settings:
                         _values(content, 'decision'),
                         tuple(_change(entry, known) for entry in content['changes']),
                         {name: tuple(others) for name, others in content['aliases'].items()},
+                        {name: (str(effect), str(number))
+                         for name, (effect, number) in content['runs_as'].items()},
+                        {name: str(why) for name, why in content['not_told'].items()},
                         tuple(Separation(frozenset(e['effects']), tuple(e['sensors']),
                                          tuple(e['drives'])) for e in content['separations']),
                         {name: tuple(lines) for name, lines in content['advice'].items()},

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.before_after.prediction import CHANNELS, KINDS
@@ -40,6 +40,11 @@ class Noise:
                     continue
                 parts.append(self._one(name, rows[stream][:, k]))
         return np.concatenate(parts)
+
+    def among(self, names: Collection[str]) -> Noise:
+        """Return this for channels of these names only; the others do not count."""
+        return Noise({name: taps for name, taps in self.filters.items() if name in names},
+                     {name: size for name, size in self.sd.items() if name in names})
 
     def _one(self, name: str, rows: FloatArray) -> FloatArray:
         taps = self.filters[name]

@@ -14,18 +14,20 @@ from lg_husky_sim.diagnosis.before_after import diagnose_change, prediction
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
 from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT, simulate
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
-from lg_husky_sim.diagnosis.before_after.conclusion import finding
-from lg_husky_sim.diagnosis.before_after.decision import decide
+from lg_husky_sim.diagnosis.before_after.conclusion import findings
+from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, ChangeCase
 from lg_husky_sim.diagnosis.before_after.drives import Drive, drives, mean_command
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
 from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of, Motion
 from lg_husky_sim.diagnosis.before_after.report import change_report
+from lg_husky_sim.diagnosis.before_after.selection import select
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.errors import DiagnosisError, RecordingError
+from lg_husky_sim.husky.effects import catalogue
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.reporting.write import write_report
@@ -161,6 +163,37 @@ def test_a_change_is_named_with_its_number(changes: Mapping[str, float], effect:
     assert finding.p_value < settings().decision['false_alarm_rate']
 
 
+@pytest.mark.parametrize(('changes', 'effect', 'side'), [
+    ({'drag': 60.0}, 'quadratic_drag', 'both'), ({'pull': -4.0}, 'yaw_pull', 'right'),
+    ({'dead_voltage': 1.5}, 'driver_deadband', 'both'),
+    ({'bus_resistance': 0.4}, 'battery_sag', 'both')])
+def test_so_is_one_of_what_the_robot_did_not_have_before(changes: Mapping[str, float], effect: str,
+                                                         side: str) -> None:
+    said = changed(changes, 7).diagnosis
+    (finding,) = said.findings
+    assert (finding.effect, finding.side) == (effect, side)
+    (number,), (value,) = finding.parameters, changes.values()
+    assert number.value == pytest.approx(value, rel=0.3)
+    (_, own), = (one for name, one in settings().runs_as.items() if name == number.name)
+    assert said.model.parameters[own] == pytest.approx(number.value)
+    assert own not in said.plain_model.parameters
+
+
+def test_two_changes_at_once_are_both_named() -> None:
+    """Each with its own number, and none beside them."""
+    said = changed(WORN, late=0.06).diagnosis
+    assert {(one.effect, one.side) for one in said.findings} == {
+        ('coulomb_drivetrain', 'left'), ('sensor_time_offset', 'both')}
+    assert [one.held_out_gain for one in said.findings] == sorted(
+        (one.held_out_gain for one in said.findings), reverse=True)
+    assert sum(one.share for one in said.findings) == pytest.approx(1.0)
+    numbers = {one.name: one.value for finding in said.findings for one in finding.parameters}
+    assert numbers['dry_left'] == pytest.approx(6.5, rel=0.3)
+    assert numbers['imu_late'] == pytest.approx(0.06, abs=0.02)
+    assert 'dry friction of the left drivetrain' in said.model.about
+    assert 'IMU' in said.model.about
+
+
 VOLTAGES = {'slew_forward': 50.0, 'slew_yaw': 100.0, 'limit_forward': 20.0, 'limit_yaw': 20.0,
             'loop_feedforward': 3.5, 'loop_gain': 0.001, 'loop_integral': 0.001,
             'turn_width': 1.08, 'yaw_damping': 10.0, 'current_limit': 500.0}
@@ -215,7 +248,7 @@ def test_a_change_of_forty_times_its_prior_is_no_deviation() -> None:
 
 @pytest.mark.parametrize(('how', 'effect'), [
     ({'delay': 0.12}, 'command_latency'), ({'factor': -1.0}, 'gyro_sign'),
-    ({'late': 0.06}, 'sensor_time_offset')])
+    ({'late': 0.06}, 'sensor_time_offset'), ({'late': 0.3}, 'sensor_time_offset')])
 def test_other_logs_show_the_same(how: Mapping[str, float], effect: str) -> None:
     """Wheel rates at 20 Hz through a low-pass, and no accelerometer."""
     case = changed({}, 7, rate=20.0, low_pass=0.08, accelerometer=0.0, **how)
@@ -232,25 +265,30 @@ def test_a_change_without_a_name_is_unknown() -> None:
     z = base.start
     named = Candidate(known.changes[3], known.changes[3].parameters, 20.0, z[:2], z[:2], z[:2],
                       1e-4)
-    block = Block(base, z, z, first_noise(known), (named,), 200.0, 1e-6)
-    decision = decide(None, block, known)
+    block = Block(base, z, z, first_noise(known), (named,), 0.0, 200.0, 1e-6)
+
+    def said(block: Block) -> tuple[Decision, ...]:
+        return select(lambda adopted: (None, replace(
+            block, explained=sum(named.gain for one in adopted if one is named.change),
+            candidates=() if adopted else block.candidates)), known).decisions
+    (decision,) = said(block)
     assert decision.named is None
     assert decision.unknown == 200.0
-    found = finding(decision, known, 0.5)
-    assert found is not None
+    (found,) = findings((decision,), known)
     assert found.p_value == 1e-6
     assert (found.effect, found.rivals[0].effect) == ('unknown', named.change.effect)
-    assert decide(None, replace(block, anything=50.0), known).named is named
-    assert decide(None, replace(block, chance=0.5), known).named is named
-    by_chance = replace(block, candidates=(replace(named, chance=0.1),), chance=0.5)
-    assert decide(None, by_chance, known).named is None
+    assert said(replace(block, anything=50.0))[0].named is named
+    assert said(replace(block, chance=0.5))[0].named is named
+    (by_chance,) = said(replace(block, candidates=(replace(named, chance=0.1),), chance=0.5))
+    assert by_chance.named is None
+    assert findings((by_chance,), known) == ()
 
 
 def test_the_order_of_recordings_does_not_matter() -> None:
     """With a shifted centre of mass, whose two names are nearly the same."""
     before = [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)]
     later = [driven('rec1', {'com_x': -0.05}, 3, OTHER), driven('rec2', {'com_x': -0.05}, 4)]
-    one, other = (said_of(a, b).decision for a, b in (
+    (one,), (other,) = (said_of(a, b).decisions for a, b in (
         (later, before), (later[::-1], before[::-1])))
     assert one.named is not None
     assert other.named is not None
@@ -297,6 +335,18 @@ def test_a_delayed_command_is_averaged_over_each_step() -> None:
     later = mean_command(drive, 0.004, 0.1)
     np.testing.assert_allclose(later[25:], total[:-25], atol=1e-9)
     assert np.max(np.abs(total)) <= 1.4 + 1e-12
+
+
+def test_of_every_effect_a_change_is_told_or_it_is_said_why_not() -> None:
+    """A gyro's factor also tells its sign; an alias is told as what it cannot be told from."""
+    known = settings()
+    told = {change.effect for change in known.changes} | {'gyro_sign'}
+    told |= {other for effect, others in known.aliases.items() if effect in told
+             for other in others}
+    assert told & set(known.not_told) == set()
+    assert set(catalogue()) == (told & set(catalogue())) | set(known.not_told)
+    assert told - set(catalogue()) == {'com_shift', 'wheel_loop_retuned'} == set(known.advice)
+    assert all(len(why) > 20 for why in known.not_told.values())
 
 
 @pytest.mark.parametrize(('there', 'instead', 'named'), [

@@ -1,0 +1,96 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Several changes at once: adopted one after another, dropped where others make up for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from lg_husky_sim.diagnosis.before_after.comparison import Block
+from lg_husky_sim.diagnosis.before_after.decision import claim, decide, Decision, unnamed
+from lg_husky_sim.diagnosis.before_after.settings import Change, Settings
+
+#: What both blocks say (of the body only where the recordings have what it takes) where some
+#: changes are adopted.
+Compared = Callable[[tuple[Change, ...]], tuple[Block | None, Block]]
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """
+    What changed.
+
+    Parameters
+    ----------
+    decisions : tuple of Decision
+        One a change, each with the others adopted, the largest gain first; a single one without
+        a name where nothing changed, or nothing that has one.
+    body, loop : Block or None
+        What both blocks say where nothing is adopted.
+    """
+
+    decisions: tuple[Decision, ...]
+    body: Block | None
+    loop: Block
+
+
+def select(compared: Compared, settings: Settings) -> Selection:
+    """
+    Adopt one change after another, then drop those that the others make up for.
+
+    Every further change is weighed where those before it differ as well, by the same evidence and
+    against the same partitions. So the rate of false alarms is that of the first that is too many.
+
+    Parameters
+    ----------
+    compared : callable
+    settings : Settings
+
+    Returns
+    -------
+    Selection
+    """
+    body, loop = compared(())
+    adopted: list[Change] = []
+    decisions: tuple[Decision, ...] = (decide(body, loop, settings),)
+    latest = decisions[0].named
+    while latest is not None and latest.change not in adopted:
+        adopted.append(latest.change)
+        if len(adopted) == int(settings.decision['changes_at_once']):
+            break
+        latest = decide(*compared(tuple(adopted)), settings).named
+    if len(adopted) > 1:
+        decisions = _needed(adopted, compared, settings) or decisions
+    explained = max((block.explained for block in compared(tuple(
+        one.named.change for one in decisions if one.named is not None))
+        if block is not None), default=0.0)
+    other = unnamed(body, loop, explained, settings)
+    return Selection(decisions if other is None else (other,), body, loop)
+
+
+def _needed(adopted: Sequence[Change], compared: Compared, settings: Settings
+            ) -> tuple[Decision, ...]:
+    # Backward elimination: what is not beyond chance beside the others goes, the last first.
+    kept = list(adopted)
+    while kept:
+        claims = [claim(change, *compared(tuple(one for one in kept if one is not change)),
+                        settings) for change in kept]
+        needless = [change for change, one in zip(kept, claims, strict=True) if one is None]
+        if not needless:
+            return tuple(sorted((one for one in claims if one is not None),
+                                key=lambda one: -one.gain))
+        kept.remove(needless[-1])
+    return ()
+
+
+def remembered(compared: Compared) -> Compared:
+    """Return a comparison that is made once for each set of changes."""
+    known: dict[frozenset[Change], tuple[Block | None, Block]] = {}
+
+    def once(adopted: tuple[Change, ...]) -> tuple[Block | None, Block]:
+        key = frozenset(adopted)
+        if key not in known:
+            known[key] = compared(adopted)
+        return known[key]
+    return once
