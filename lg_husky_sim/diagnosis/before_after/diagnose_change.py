@@ -99,8 +99,7 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
         streams = frozenset.intersection(*(frozenset(d.bins) for d in (*before, *after)))
         base = at_the_edge(base_of(known, nominal.parameters, True, max(intervals, default=0.0),
                                    streams), (*before, *after))
-        base, lags = lags_of(recordings, baseline, base)
-        begin = base.start
+        begin, lags = base.start, lags_of(recordings, baseline, base)
         if all(_shows_the_body(drive) for drive in (*before, *after)):
             moved = fit_recordings(base, (*before, *after), lags, begin, pool, lambda share: (
                 progress('motion of the body', 0.02 + 0.28 * share)))

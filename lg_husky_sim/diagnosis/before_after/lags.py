@@ -1,25 +1,23 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How late a stream of a recording is, as the streams say of each other, without a model."""
+"""How late streams are against a baseline, as they say of each other, without a model."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from lg_husky_sim.diagnosis.before_after.prediction import Base
-from lg_husky_sim.diagnosis.sensors.faults import faults
-from lg_husky_sim.diagnosis.sensors.relations import relations
-from lg_husky_sim.diagnosis.wording import LATENESS
+from lg_husky_sim.diagnosis.sensors.relations import by_names, relations
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.recording import Recording, segments
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 
 def lags_of(recordings: Sequence[Recording], baseline: Sequence[Recording], base: Base
-            ) -> tuple[Base, Mapping[str, FloatArray]]:
+            ) -> Mapping[str, FloatArray]:
     """
-    Return where the delays of each recording are.
+    Return by how much the streams of each recording are later than in the baseline.
 
     Parameters
     ----------
@@ -29,23 +27,25 @@ def lags_of(recordings: Sequence[Recording], baseline: Sequence[Recording], base
 
     Returns
     -------
-    Base
-        Whose stream of reference is as late as in the baseline.
     mapping of str to numpy.ndarray, shape (n,)
-        By recording, how late its streams are beyond that, on the scale of the estimates; zero
-        where no stream is at fault, and for all but delays.
+        By recording, on the scale of the estimates; zero where they are as late as before, and for
+        all but delays. Where both other streams are early, it is that of reference which is late.
     """
-    lags = {one.name: _lags(one, base) for one in (*baseline, *recordings)}
-    usual = np.zeros(base.start.size)
-    usual[base.reference] = np.median([lags[one.name][base.reference] for one in baseline])
-    return (replace(base, start=base.start + usual),
-            {name: lag - usual for name, lag in lags.items()})
-
-
-def _lags(recording: Recording, base: Base) -> FloatArray:
-    found = np.zeros(base.start.size)
-    for fault in faults(relations(segments(recording))):
-        number = fault.number
-        if fault.stream and number is not None and number.name == LATENESS:
-            found[base.names.index(f'{fault.stream}_late')] = number.value
-    return found
+    known = {one.name: by_names(relations(segments(one))) for one in (*baseline, *recordings)}
+    reference = base.names[base.reference].removesuffix('_late')
+    lags = {name: np.zeros(base.start.size) for name in known}
+    for stream in ('wheels', 'imu'):
+        found = {name: one['yaw rate', stream, reference] for name, one in known.items()
+                 if ('yaw rate', stream, reference) in one}
+        before = [found[one.name].late.value for one in baseline if one.name in found]
+        for name, relation in found.items() if before else ():
+            more = relation.late.value - float(np.median(before))
+            if abs(more) > max(setting('late_tolerance'), relation.interval):
+                lags[name][base.names.index(f'{stream}_late')] = more
+    if reference == 'pose':
+        both = [base.names.index(f'{stream}_late') for stream in ('wheels', 'imu')]
+        for lag in lags.values():
+            shared = float(np.median([0.0, *lag[both]]))
+            lag[both] -= shared
+            lag[base.reference] -= shared
+    return lags

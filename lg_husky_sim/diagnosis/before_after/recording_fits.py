@@ -131,9 +131,8 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
     # A delay of every stream is one of the commands: that of one stream is none in all recordings.
     wide[base.reference] = base.sd[base.reference]
     for turn, until in enumerate((roughly, enough)):
-        middle = _mean(base, prior, wide, places, _quadratics(
-            base, groups, noise, prior, places, pool)) - np.where(
-                free, np.mean(list(lags.values()), axis=0), 0.0)
+        middle = _mean(base, prior, wide, places, [q.less(lags[q.recording]) for q in _quadratics(
+            base, groups, noise, prior, places, pool)])
         about = Prior(middle, wide, prior.free)
         ends = {'': middle, **{name: place - lags[name] for name, place in places.items()}}
 
