@@ -345,7 +345,7 @@ def test_of_every_effect_a_change_is_told_or_it_is_said_why_not() -> None:
              for other in others}
     assert told & set(known.not_told) == set()
     assert set(catalogue()) == (told & set(catalogue())) | set(known.not_told)
-    assert told - set(catalogue()) == {'com_shift', 'wheel_loop_retuned'} == set(known.advice)
+    assert told - set(catalogue()) == {'com_shift', 'wheel_loop_retuned'} == set(known.names)
     assert all(len(why) > 20 for why in known.not_told.values())
 
 
