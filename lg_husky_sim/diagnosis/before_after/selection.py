@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from lg_husky_sim.diagnosis.before_after.comparison import Block
+from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
 from lg_husky_sim.diagnosis.before_after.decision import claim, decide, Decision, unnamed
 from lg_husky_sim.diagnosis.before_after.settings import Change, Settings
 
@@ -59,7 +59,7 @@ def select(compared: Compared, settings: Settings) -> Selection:
         adopted.append(latest.change)
         if len(adopted) == int(settings.decision['changes_at_once']):
             break
-        latest = decide(*compared(tuple(adopted)), settings).named
+        latest = _further(compared, adopted, decisions[0].gain, settings)
     if len(adopted) > 1:
         decisions = _needed(adopted, compared, settings) or decisions
     explained = max((block.explained for block in compared(tuple(
@@ -67,6 +67,20 @@ def select(compared: Compared, settings: Settings) -> Selection:
         if block is not None), default=0.0)
     other = unnamed(body, loop, explained, settings)
     return Selection(decisions if other is None else (other,), body, loop)
+
+
+def _further(compared: Compared, adopted: Sequence[Change], first: float, settings: Settings
+             ) -> Candidate | None:
+    # What moves the body is told by the body's own block, if there is one: the loop's model takes
+    # it for what it leaves out. So does the law of a change, by a share of what that gains.
+    body, loop = compared(tuple(adopted))
+    if body is not None:
+        loop = replace(loop, candidates=tuple(
+            one for one in loop.candidates if one.change.block == 'loop'))
+    named = decide(body, loop, settings).named
+    if named is None or named.gain < settings.decision['further_share'] * first:
+        return None
+    return named
 
 
 def _needed(adopted: Sequence[Change], compared: Compared, settings: Settings
