@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import combinations
 import math
 
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
+from lg_husky_sim.diagnosis.before_after.fitting import Prior
 from lg_husky_sim.diagnosis.before_after.judge import exchange_chance
 from lg_husky_sim.diagnosis.before_after.prediction import Base
 from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
@@ -59,7 +61,8 @@ class Block:
     ----------
     base : Base
     before, after : numpy.ndarray, shape (n,)
-        Means of the sets, on the scale of the estimates.
+        Means of the sets where what is adopted differs, or everything where nothing is, on the
+        scale of the estimates.
     noise : Noise
     candidates : tuple of Candidate
         By gain, the largest first; with the wheels as measured, those of the body only.
@@ -119,16 +122,67 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
         gains.append(weighed[0].gain if weighed else 0.0)
         other = comparison.evidence(comparison.without(all_of_it, later), way)
         wholes.append(other.solve(comparison.everything).evidence - other.nothing)
+    shared, moved = every.shared, all_of_it
+    if adopted:
+        shared, moved = evidence.solve(comparison.changed).shared, comparison.shift(evidence, ())
     before = np.array(fits.prior.mean)
-    before[comparison.index] = every.shared
+    before[comparison.index] = shared
     after = np.array(before)
-    after[comparison.index] += all_of_it
+    after[comparison.index] += moved
     bounds = fits.base.bounds()
     return Block(
         fits.base, np.clip(before, *bounds), np.clip(after, *bounds), fits.noise,
         tuple(replace(one, chance=exchange_chance(one.gain, gains, numbers))
               for one in candidates), comparison.explained(evidence), anything,
         exchange_chance(anything, wholes, numbers))
+
+
+def refitted(fits: RecordingFits, later: Collection[str], adopted: Sequence[Change],
+             pool: ThreadPoolExecutor) -> RecordingFits:
+    """
+    Return the later recordings fitted once more, with what a nominal robot has not.
+
+    Of a parameter that the fits hold, a derivative where it is nominal tells whether it has
+    changed, but not by how much where that is a lot, nor what else has.
+
+    Parameters
+    ----------
+    fits : RecordingFits
+    later : collection of str
+        Names of the recordings after the change.
+    adopted : sequence of Change
+        What differs; its parameters are wide open, the others as wide as recordings differ.
+        A limit may be anywhere that a change brings it to.
+    pool : ThreadPoolExecutor
+
+    Returns
+    -------
+    RecordingFits
+        The same where all that differs is fitted already.
+    """
+    quantities = fits.base.settings.quantities
+    brought = {name for change in adopted for name in change.parameters
+               if name in fits.base.settings.runs_as}
+    comparison = _Comparison(fits, adopted)
+    if not brought & {quantities[k].name for k in comparison.index}:
+        return fits
+    evidence, index = comparison.evidence(comparison.quadratics, later), comparison.index
+    mean, sd = np.array(fits.prior.mean), np.array(fits.prior.sd)
+    mean[index] = evidence.solve(comparison.changed).shared + comparison.shift(evidence, ())
+    sd[index] = np.hypot(evidence.recording_sd,
+                         fits.base.settings.fit['drawn_least'] * fits.prior.sd[index])
+    changed = index[comparison.changed]
+    sd[changed] = [quantities[k].change for k in changed]
+    held = np.array([q.name in fits.base.settings.runs_as and q.name not in brought
+                     for q in quantities])
+    for k, quantity in enumerate(quantities):
+        if quantity.name in fits.base.settings.limits:
+            mean[k] = max(place[k] for place in fits.places.values())
+            sd[k] = quantity.change
+    mean = np.clip(np.where(held, fits.base.start, mean), *fits.base.bounds())
+    about = Prior(mean, sd, fits.prior.free & ~held)
+    return fits.again({one.recording: about for one in fits.quadratics if one.recording in later},
+                      pool)
 
 
 def partitions(names: Sequence[str], later: Collection[str], most: int, listed: int
@@ -198,9 +252,14 @@ class _Comparison:
         """Return where parameters of these names are."""
         return np.array([self._place[name] for name in names], dtype=np.intp)
 
+    @property
+    def changed(self) -> NDArray[np.intp]:
+        """Where the parameters are that are adopted to differ."""
+        return self.places(self._adopted)
+
     def explained(self, evidence: Evidence) -> float:
         """Return what the changes that are adopted gain together [nats]."""
-        return evidence.solve(self.places(self._adopted)).evidence - evidence.nothing
+        return evidence.solve(self.changed).evidence - evidence.nothing
 
     def shift(self, evidence: Evidence, names: Sequence[str]) -> FloatArray:
         """Return by how much all parameters differ where these and those adopted may."""
@@ -232,7 +291,7 @@ class _Comparison:
         Of a change that shares parameters with what is adopted, only the others are weighed.
         """
         base, found, count = self.fits.base, [], len(self._adopted)
-        known = evidence.solve(self.places(self._adopted)).evidence
+        known = evidence.solve(self.changed).evidence
         for change in base.settings.changes:
             names = tuple(name for name in self._names(change) if name not in self._adopted)
             if (base.given and change.block != 'body') or not names:

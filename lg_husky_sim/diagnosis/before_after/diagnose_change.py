@@ -4,17 +4,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from lg_husky_sim.diagnosis.before_after.comparison import Block, compare
+from lg_husky_sim.diagnosis.before_after.comparison import Block, compare, refitted
 from lg_husky_sim.diagnosis.before_after.conclusion import findings, mismatches, not_told_apart
 from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.drives import all_drives, Drive
 from lg_husky_sim.diagnosis.before_after.fitting import threads
 from lg_husky_sim.diagnosis.before_after.lags import lags_of
 from lg_husky_sim.diagnosis.before_after.prediction import base_of
-from lg_husky_sim.diagnosis.before_after.recording_fits import at_the_edge, fit_recordings
+from lg_husky_sim.diagnosis.before_after.recording_fits import (
+    at_the_edge,
+    fit_recordings,
+    RecordingFits,
+)
 from lg_husky_sim.diagnosis.before_after.runnable import carried, fitted, having, started
 from lg_husky_sim.diagnosis.before_after.selection import remembered, select, Selection
 from lg_husky_sim.diagnosis.before_after.settings import Change, Settings, settings
@@ -100,6 +104,7 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
         base = at_the_edge(base_of(known, nominal.parameters, True, max(intervals, default=0.0),
                                    streams), (*before, *after))
         begin, lags = base.start, lags_of(recordings, baseline, base)
+        before, after = (_drives(one, known, lags) for one in (baseline, recordings))
         if all(_shows_the_body(drive) for drive in (*before, *after)):
             moved = fit_recordings(base, (*before, *after), lags, begin, pool, lambda share: (
                 progress('motion of the body', 0.02 + 0.28 * share)))
@@ -108,9 +113,14 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
             replace(base, given=False), (*before, *after), lags, begin, pool,
             lambda share: progress('wheel loop and body', 0.3 + 0.45 * share))
 
-        def compared(adopted: Sequence[Change]) -> tuple[Block | None, Block]:
-            return (None if moved is None else compare(moved, later, adopted),
-                    compare(looped, later, adopted))
+        def block(fits: RecordingFits, adopted: Sequence[Change], fitted: Sequence[Change]
+                  ) -> Block:
+            return compare(refitted(fits, later, fitted, pool), later, adopted)
+
+        def compared(adopted: Sequence[Change], fitted: Sequence[Change]
+                     ) -> tuple[Block | None, Block]:
+            return (None if moved is None else block(moved, adopted, fitted),
+                    block(looped, adopted, fitted))
         progress('several changes', 0.75)
         found = select(remembered(compared), known)
     progress('model', 0.8)
@@ -120,11 +130,14 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
                       found.decisions, found.body, found.loop, parts, nominal)
 
 
-def _drives(recordings: Sequence[Recording], known: Settings) -> tuple[Drive, ...]:
+def _drives(recordings: Sequence[Recording], known: Settings,
+            lags: Mapping[str, FloatArray] | None = None) -> tuple[Drive, ...]:
+    # Without the end of stretches where a stream that is early runs past the simulation.
     found: list[Drive] = []
     for recording in recordings:
+        early = 0.0 if lags is None else max(-float(np.min(lags[recording.name])), 0.0)
         drives = all_drives([recording], known.simulation['step'], known.bins,
-                            known.fit['settle'], known.fit['shortest'], known.fit['early'])
+                            known.fit['settle'], known.fit['shortest'], early)
         if not drives:
             raise RecordingError(
                 f'recording {recording.name} has no stretch of {known.fit["shortest"]:g} s '
@@ -148,7 +161,7 @@ def _diagnosis(selection: Selection, after: Sequence[Drive], earlier: Sequence[S
 
     def begun(z: FloatArray) -> ModelFile:
         return started(nominal, dict(zip(names, loop.base.values(z), strict=True)), known)
-    old, new = begun(loop.before), begun(loop.after)
+    old, new = begun(selection.claimed.before), begun(selection.claimed.after)
     plain = fitted([old], earlier, steps, about)
     progress('model', 0.87)
     train, test = split(later)

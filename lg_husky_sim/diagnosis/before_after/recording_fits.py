@@ -27,6 +27,7 @@ from lg_husky_sim.diagnosis.before_after.prediction import (
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise, Noise, noise_of
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 #: Told how far it is (0 to 1).
 Share = Callable[[float], None]
@@ -51,6 +52,7 @@ class RecordingFits:
         Where each recording is likeliest.
     quadratics : tuple of Quadratic
         The likelihood of each recording about its own fit, for all parameters.
+    drives : tuple of Drive
     """
 
     base: Base
@@ -59,6 +61,41 @@ class RecordingFits:
     common: FloatArray
     places: Places
     quadratics: tuple[Quadratic, ...]
+    drives: tuple[Drive, ...]
+
+    def again(self, expected: Mapping[str, Prior], pool: ThreadPoolExecutor) -> RecordingFits:
+        """
+        Return this with some recordings fitted once more.
+
+        Parameters
+        ----------
+        expected : mapping of str to Prior
+            By recording, what is expected of it; its fit begins where it was, and there.
+        pool : ThreadPoolExecutor
+
+        Returns
+        -------
+        RecordingFits
+        """
+        base, numbers = self.base, self.base.settings.fit
+        groups = _by_recording(self.drives)
+        held = np.array([q.name in base.settings.runs_as for q in base.settings.quantities])
+
+        def end(name: str) -> FloatArray:
+            about = expected[name]
+            return min((fit_set(
+                base, groups[name], about, self.noise, start, int(numbers['steps']),
+                numbers['enough'], map) for start in (
+                    np.where(held, about.mean, self.places[name]), about.mean)),
+                key=lambda fit: fit.cost).z
+        ends = pool.map(end, expected)
+        places = {**self.places, **dict(zip(expected, ends, strict=True))}
+        found = {one.recording: _with_limits(base, groups[one.recording], self.noise, self.prior,
+                                             places, one)
+                 for one in _quadratics(base, {name: groups[name] for name in expected},
+                                        self.noise, self.prior, places, pool)}
+        return replace(self, places=places, quadratics=tuple(
+            found.get(one.recording, one) for one in self.quadratics))
 
 
 def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: FloatArray,
@@ -68,8 +105,10 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
 
     The longest is fitted first, from every kind of robot; the others begin there, or where any
     start is likelier. Then all are fitted twice more, with a prior about their mean that is as
-    wide as a change, and each may begin where any other ended, or at a start from there. Where it
-    begins, and what its delays are expected to be, differs by as much as its streams say.
+    wide as a change, and each may begin where any other ended, or at a start from there. At last
+    that prior is as wide as the recordings show themselves to differ, whichever set they are of.
+    Where a fit begins, and what its delays are expected to be, differs by as much as its streams
+    say.
 
     Parameters
     ----------
@@ -87,49 +126,66 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
     -------
     RecordingFits
     """
-    numbers = base.settings.fit
-    quantities = base.settings.quantities
+    numbers, quantities = base.settings.fit, base.settings.quantities
     free = np.array([not base.given or q.name in base.settings.body for q in quantities])
     # What the nominal robot has not stays out of the fits, which it would lead astray: whether it
     # has come to be there is told from the derivatives.
     held = np.array([q.name in base.settings.runs_as for q in quantities])
     every, prior = Prior(base.start, base.sd, free), Prior(base.start, base.sd, free & ~held)
+    wide = np.array([np.hypot(q.recording, q.change) for q in quantities])
+    # A delay of every stream is one of the commands: that of one stream is none in all recordings.
+    wide[base.reference] = base.sd[base.reference]
+    groups = _by_recording(drives)
+    places, noise, prior = _alone(base, prior, wide, groups, lags, begin, pool, share)
+    every = replace(every, mean=prior.mean)
+    common = np.array(begin)
+    for _ in range(int(numbers['drawn'])):
+        about = _deviations(base, prior, wide, places, [
+            q.less(lags[q.recording])
+            for q in _quadratics(base, groups, noise, prior, places, pool)])
+        common = about.mean
+
+        def drawn(name: str, about: Prior = about, places: Places = places) -> FloatArray:
+            here = replace(about, mean=about.mean + lags[name])
+            return _raced(base, groups[name], here, noise, [[places[name]], [here.mean]],
+                          numbers['enough']).z
+        places = dict(zip(groups, pool.map(drawn, groups), strict=True))
+    found = _quadratics(base, groups, noise, every, places, pool)
+    share(1.0)
+    return RecordingFits(base, every, noise, common, places, tuple(
+        _with_limits(base, groups[one.recording], noise, every, places, one) for one in found),
+        tuple(drives))
+
+
+def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequence[Drive]],
+           lags: Places, begin: FloatArray, pool: ThreadPoolExecutor, share: Share
+           ) -> tuple[Places, Noise, Prior]:
+    # Each recording by itself, its parameters as far from the mean of all as a change is wide; and
+    # the prior of the kind of robot that they are of.
+    numbers = base.settings.fit
     steps, enough, roughly = int(numbers['steps']), numbers['enough'], numbers['roughly']
-    noise = first_noise(base.settings).among(_moving(base, drives))
-    groups: dict[str, list[Drive]] = {}
-    for drive in drives:
-        groups.setdefault(drive.recording, []).append(drive)
-    longest = max(groups, key=lambda name: sum(d.steps for d in groups[name]))
+    noise = first_noise(base.settings).among(_moving(
+        base, [drive for drives in groups.values() for drive in drives]))
+    names = list(groups)
+    longest = max(names, key=lambda name: sum(d.steps for d in groups[name]))
     kinds = _kinds(base, prior, begin)
-    firsts = list(pool.map(lambda start: fit_set(
-        base, groups[longest], replace(prior, mean=prior.mean + lags[longest]), noise,
-        start + lags[longest], steps, roughly, map), kinds))
-    first = min(firsts, key=lambda fit: fit.cost).z
+    firsts = list(pool.map(lambda kind: fit_set(
+        base, groups[longest], replace(kind[1], mean=kind[1].mean + lags[longest]), noise,
+        kind[0] + lags[longest], steps, roughly, map), kinds))
+    best = min(range(len(kinds)), key=lambda k: firsts[k].cost)
+    first, prior = firsts[best].z, kinds[best][1]
     share(0.2)
 
     def fitted(name: str, about: Prior, kinds: Sequence[Sequence[FloatArray]], until: float
                ) -> SetFit:
-        about = replace(about, mean=about.mean + lags[name])
-
-        def cost(start: FloatArray) -> float:
-            return cost_at(base, groups[name], about, noise, start, map)
-
-        def fit(start: FloatArray, at_most: int) -> SetFit:
-            return fit_set(base, groups[name], about, noise, start, at_most, until, map)
-        nearest = sorted(((cost(one), k, one) for k, kind in enumerate(kinds) for one in [
-            min(kind, key=cost)]), key=lambda one: one[:2])[:int(numbers['raced'])]
-        begun = min((fit(one, int(numbers['race_steps'])) for _, _, one in nearest),
-                    key=lambda one: one.cost)
-        return fit(begun.z, steps)
-    names = list(groups)
-    options = [*kinds, *_shifted(base, free, first - lags[longest])]
+        return _raced(base, groups[name], replace(about, mean=about.mean + lags[name]), noise,
+                      kinds, until)
+    options = [*(start for start, _ in kinds),
+               *_shifted(base, prior.free, first - lags[longest])]
     places = dict(zip(names, pool.map(lambda name: first if name == longest else fitted(
         name, prior, [[one + lags[name]] for one in options], roughly).z, names), strict=True))
     share(0.4)
     noise = _renewed(base, groups, places).among(noise.sd)
-    wide = np.array([np.hypot(q.recording, q.change) for q in quantities])
-    # A delay of every stream is one of the commands: that of one stream is none in all recordings.
-    wide[base.reference] = base.sd[base.reference]
     for turn, until in enumerate((roughly, enough)):
         middle = _mean(base, prior, wide, places, [q.less(lags[q.recording]) for q in _quadratics(
             base, groups, noise, prior, places, pool)])
@@ -141,18 +197,32 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
             # Of starts of a kind that begin at different ends, the likeliest.
             begins = [end + lags[name] for other, end in ends.items() if other != name or not turn]
             others = [[one] for one in begins] if turn else list(zip(
-                *(_shifted(base, free, one) for one in begins), strict=True))
+                *(_shifted(base, prior.free, one) for one in begins), strict=True))
             fits = [fitted(name, about, [[places[name]]], until),
                     fitted(name, about, others, until)]
             return min(fits, key=lambda fit: fit.cost).z
         places = dict(zip(names, pool.map(again, names), strict=True))
-        share(0.65 + 0.2 * turn)
+        share(0.6 + 0.15 * turn)
         if not turn:
             noise = _renewed(base, groups, places).among(noise.sd)
-    found = _quadratics(base, groups, noise, every, places, pool)
-    share(1.0)
-    return RecordingFits(base, every, noise, middle, places, tuple(
-        _with_limits(base, groups[one.recording], noise, every, places, one) for one in found))
+    return places, noise, prior
+
+
+def _raced(base: Base, drives: Sequence[Drive], about: Prior, noise: Noise,
+           kinds: Sequence[Sequence[FloatArray]], until: float) -> SetFit:
+    # From the likeliest start of each kind, of the best few of which one goes on.
+    numbers = base.settings.fit
+
+    def cost(start: FloatArray) -> float:
+        return cost_at(base, drives, about, noise, start, map)
+
+    def fit(start: FloatArray, at_most: int) -> SetFit:
+        return fit_set(base, drives, about, noise, start, at_most, until, map)
+    nearest = sorted(((cost(one), k, one) for k, kind in enumerate(kinds) for one in [
+        min(kind, key=cost)]), key=lambda one: one[:2])[:int(numbers['raced'])]
+    begun = min((fit(one, int(numbers['race_steps'])) for _, _, one in nearest),
+                key=lambda one: one.cost)
+    return fit(begun.z, int(numbers['steps']))
 
 
 def at_the_edge(base: Base, drives: Sequence[Drive]) -> Base:
@@ -180,6 +250,13 @@ def quadratic(base: Base, drive: Drive, noise: Noise, z: FloatArray, prior: Prio
                      0.5 * float(e @ e) - float(z @ slope) + 0.5 * float(z @ curvature @ z))
 
 
+def _by_recording(drives: Sequence[Drive]) -> dict[str, list[Drive]]:
+    groups: dict[str, list[Drive]] = {}
+    for drive in drives:
+        groups.setdefault(drive.recording, []).append(drive)
+    return groups
+
+
 def _moving(base: Base, drives: Sequence[Drive]) -> set[str]:
     # Channels that read more than one value: an IMU without an accelerometer reads zeros.
     return {name for drive in drives for stream, rows in measured(base, drive).items()
@@ -187,21 +264,24 @@ def _moving(base: Base, drives: Sequence[Drive]) -> set[str]:
             if column.size and np.ptp(column) > 0.0}
 
 
-def _kinds(base: Base, prior: Prior, begin: FloatArray) -> list[FloatArray]:
-    # Where the kinds of robot are the same for this block, once.
-    names, found = base.names, [begin]
+def _kinds(base: Base, prior: Prior, begin: FloatArray) -> list[tuple[FloatArray, Prior]]:
+    # Where the kinds of robot are the same for this block, once. Whether there is a loop is no
+    # matter of degree: its gains are expected about those of the kind.
+    names, found = base.names, [(begin, prior)]
     for kind in base.kinds:
-        start = np.array(begin)
+        start, mean = np.array(begin), np.array(prior.mean)
         for name, value in kind.items():
             k = names.index(name)
             if prior.free[k]:
                 start[k] = base.place(name, value)
-        if not any(np.array_equal(start, one) for one in found):
-            found.append(start)
+                if name in base.settings.of_a_kind:
+                    mean[k] = start[k]
+        if not any(np.array_equal(start, one) for one, _ in found):
+            found.append((start, replace(prior, mean=mean)))
     return found
 
 
-def _shifted(base: Base, free: FloatArray, begin: FloatArray) -> list[FloatArray]:
+def _shifted(base: Base, free: NDArray[np.bool_], begin: FloatArray) -> list[FloatArray]:
     names, (lower, upper) = base.names, base.bounds()
     found = [begin]
     for entry in base.settings.starts:
@@ -223,6 +303,26 @@ def _quadratics(base: Base, groups: Mapping[str, Sequence[Drive]], noise: Noise,
     return joined(list(pool.map(
         lambda drive: quadratic(base, drive, noise, places[drive.recording], prior),
         [d for ds in groups.values() for d in ds])))
+
+
+def _deviations(base: Base, prior: Prior, wide: FloatArray, places: Places,
+                quadratics: Sequence[Quadratic]) -> Prior:
+    # What is expected of each recording by the others: about what they share, as wide as they show
+    # themselves to differ. Derivatives of recordings that lie apart for no reason do not fit each
+    # other. A limit may be anywhere that a change brings it to.
+    index, numbers = np.flatnonzero(prior.free), base.settings.fit
+    quantities = base.settings.quantities
+    sd = np.array([q.recording for q in quantities])
+    sd[base.reference] = wide[base.reference]
+    found = Evidence([one.among(index) for one in quadratics], prior.mean[index], prior.sd[index],
+                     sd[index], wide[index]).estimated(
+        numbers['recordings_body' if base.given else 'recordings_loop'],
+        int(numbers['recording_rounds']), numbers['recording_free'])
+    sd[index] = np.hypot(found.recording_sd, numbers['drawn_least'] * prior.sd[index])
+    for k, quantity in enumerate(quantities):
+        if quantity.name in base.settings.limits or k == base.reference:
+            sd[k] = wide[k]
+    return Prior(_mean(base, prior, sd, places, quadratics), sd, prior.free)
 
 
 def _mean(base: Base, prior: Prior, wide: FloatArray, places: Places,

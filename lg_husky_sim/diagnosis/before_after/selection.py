@@ -12,8 +12,8 @@ from lg_husky_sim.diagnosis.before_after.decision import claim, decide, Decision
 from lg_husky_sim.diagnosis.before_after.settings import Change, Settings
 
 #: What both blocks say (of the body only where the recordings have what it takes) where some
-#: changes are adopted.
-Compared = Callable[[tuple[Change, ...]], tuple[Block | None, Block]]
+#: changes are adopted; and the changes with which the recordings are fitted for that.
+Compared = Callable[[tuple[Change, ...], tuple[Change, ...]], tuple[Block | None, Block]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +28,14 @@ class Selection:
         a name where nothing changed, or nothing that has one.
     body, loop : Block or None
         What both blocks say where nothing is adopted.
+    claimed : Block
+        What all channels say where the changes that are named are.
     """
 
     decisions: tuple[Decision, ...]
     body: Block | None
     loop: Block
+    claimed: Block
 
 
 def select(compared: Compared, settings: Settings) -> Selection:
@@ -51,7 +54,7 @@ def select(compared: Compared, settings: Settings) -> Selection:
     -------
     Selection
     """
-    body, loop = compared(())
+    body, loop = compared((), ())
     adopted: list[Change] = []
     decisions: tuple[Decision, ...] = (decide(body, loop, settings),)
     latest = decisions[0].named
@@ -60,20 +63,22 @@ def select(compared: Compared, settings: Settings) -> Selection:
         if len(adopted) == int(settings.decision['changes_at_once']):
             break
         latest = _further(compared, adopted, decisions[0].gain, settings)
-    if len(adopted) > 1:
+    if adopted:
         decisions = _needed(adopted, compared, settings) or decisions
-    explained = max((block.explained for block in compared(tuple(
-        one.named.change for one in decisions if one.named is not None))
-        if block is not None), default=0.0)
+    claimed = tuple(one.named.change for one in decisions if one.named is not None)
+    with_them = compared(claimed, _bringing(claimed, settings))
+    explained = max(block.explained for block in with_them if block is not None)
     other = unnamed(body, loop, explained, settings)
-    return Selection(decisions if other is None else (other,), body, loop)
+    if other is not None:
+        return Selection((other,), body, loop, loop)
+    return Selection(decisions, body, loop, with_them[1])
 
 
 def _further(compared: Compared, adopted: Sequence[Change], first: float, settings: Settings
              ) -> Candidate | None:
     # What moves the body is told by the body's own block, if there is one: the loop's model takes
     # it for what it leaves out. So does the law of a change, by a share of what that gains.
-    body, loop = compared(tuple(adopted))
+    body, loop = compared(tuple(adopted), _bringing(adopted, settings))
     if body is not None:
         loop = replace(loop, candidates=tuple(
             one for one in loop.candidates if one.change.block == 'loop'))
@@ -83,13 +88,19 @@ def _further(compared: Compared, adopted: Sequence[Change], first: float, settin
     return named
 
 
+def _bringing(changes: Sequence[Change], settings: Settings) -> tuple[Change, ...]:
+    # Those of what a nominal robot has not, with which recordings are to be fitted again.
+    return tuple(one for one in changes if set(one.parameters) & set(settings.runs_as))
+
+
 def _needed(adopted: Sequence[Change], compared: Compared, settings: Settings
             ) -> tuple[Decision, ...]:
     # Backward elimination: what is not beyond chance beside the others goes, the last first.
     kept = list(adopted)
     while kept:
-        claims = [claim(change, *compared(tuple(one for one in kept if one is not change)),
-                        settings) for change in kept]
+        claims = [claim(change, *compared(tuple(one for one in kept if one is not change),
+                                          _bringing(kept, settings)), settings)
+                  for change in kept]
         needless = [change for change, one in zip(kept, claims, strict=True) if one is None]
         if not needless:
             return tuple(sorted((one for one in claims if one is not None),
@@ -100,11 +111,12 @@ def _needed(adopted: Sequence[Change], compared: Compared, settings: Settings
 
 def remembered(compared: Compared) -> Compared:
     """Return a comparison that is made once for each set of changes."""
-    known: dict[frozenset[Change], tuple[Block | None, Block]] = {}
+    known: dict[tuple[frozenset[Change], frozenset[Change]], tuple[Block | None, Block]] = {}
 
-    def once(adopted: tuple[Change, ...]) -> tuple[Block | None, Block]:
-        key = frozenset(adopted)
+    def once(adopted: tuple[Change, ...], fitted: tuple[Change, ...]
+             ) -> tuple[Block | None, Block]:
+        key = frozenset(adopted), frozenset(fitted)
         if key not in known:
-            known[key] = compared(adopted)
+            known[key] = compared(adopted, fitted)
         return known[key]
     return once

@@ -120,6 +120,7 @@ class Settings:
     noise: Mapping[str, float]
     body: frozenset[str]
     limits: frozenset[str]
+    of_a_kind: frozenset[str]
     starts: tuple[Mapping[str, float], ...]
     kinds: tuple[Mapping[str, float], ...]
     fit: Mapping[str, float]
@@ -201,16 +202,17 @@ def settings() -> Settings:
         bins = {name: _number(f'{name}.bin', entry['bin']) for name, entry in channels}
         noise = {name: _number(f'{name}.noise', entry['noise']) for name, entry in channels}
         known = frozenset((*robot, *(q.name for q in record)))
-        groups = {key: frozenset(content[key]) for key in ('body', 'limits')}
+        groups = {key: frozenset(content[key]) for key in ('body', 'limits', 'of_a_kind')}
         starts, kinds = (tuple({name: _number(f'{section}.{name}', value)
                                 for name, value in entry.items()} for entry in content[section])
                          for section in ('starts', 'kinds'))
-        for name in sorted({*groups['body'], *groups['limits'],
+        for name in sorted({*(name for group in groups.values() for name in group),
                             *(name for entry in (*starts, *kinds) for name in entry)} - known):
             raise DiagnosisError(f'{path}: unknown parameter {shown(name)}')
         return Settings(tuple(robot[name] for name in ROBOT), record,
                         _values(content, 'simulation'), bins, noise, groups['body'],
-                        groups['limits'], starts, kinds, _values(content, 'fit'),
+                        groups['limits'], groups['of_a_kind'], starts, kinds,
+                        _values(content, 'fit'),
                         _values(content, 'decision'),
                         tuple(_change(entry, known) for entry in content['changes']),
                         {name: tuple(others) for name, others in content['aliases'].items()},
