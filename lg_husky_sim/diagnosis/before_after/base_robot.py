@@ -41,7 +41,7 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     step : float
         [s].
     command : numpy.ndarray, shape (n, 2)
-        Mean command in each step, delayed [m/s, rad/s].
+        Mean of the accepted command in each step [m/s, rad/s].
     level : numpy.ndarray, shape (n, 2)
         Cosine and sine of the heading; zeros where it is not known.
     wheels : numpy.ndarray, shape (n + 1, 2)
@@ -52,7 +52,7 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     out : numpy.ndarray, shape (n + 1, 7)
         Filled with `OUTPUTS`.
     """
-    slew_v, slew_w, limit_v, limit_w, speed_gain, turn_width = p[0], p[1], p[2], p[3], p[4], p[5]
+    speed_gain, turn_width = p[4], p[5]
     kff, kp, ki, v_max, i_max, inertia = p[6], p[7], p[8], p[9], p[10], p[11]
     mux, muy, creep, share, rolling, yaw_damping = p[16], p[17], p[18], p[19], p[20], p[21]
     mass, turning, xc, yc, height = p[22], p[23], p[24], p[25], p[26]
@@ -78,9 +78,8 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     for s in range(2):
         e = dry[s] * w[s] / np.sqrt(w[s] * w[s] + dry_speed * dry_speed) + viscous[s] * w[s]
         held[s] = built * (e / volt_per_amp + (emf - kff) * w[s])
-    ref_v = 0.5 * radius * (w[0] + w[1]) / speed_gain
-    ref_w = radius * (w[1] - w[0]) / turn_width
-    slow_v, slow_w = ref_v, ref_w
+    slow_v = 0.5 * radius * (w[0] + w[1]) / speed_gain
+    slow_w = radius * (w[1] - w[0]) / turn_width
     acc_x, acc_y = 0.0, 0.0
     keep = step / (step + load_time)
     a = np.zeros(2)
@@ -101,12 +100,8 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     out[0, 5] = 0.0
     out[0, 6] = 0.0
     for k in range(command.shape[0]):
-        want_v = min(max(command[k, 0], -limit_v), limit_v)
-        want_w = min(max(command[k, 1], -limit_w), limit_w)
-        ref_v += min(max(want_v - ref_v, -slew_v * step), slew_v * step)
-        ref_w += min(max(want_w - ref_w, -slew_w * step), slew_w * step)
-        slow_v += follow * (ref_v - slow_v)
-        slow_w += follow * (ref_w - slow_w)
+        slow_v += follow * (command[k, 0] - slow_v)
+        slow_w += follow * (command[k, 1] - slow_w)
         gx = -(slope_x * level[k, 0] + slope_y * level[k, 1])
         gy = -(-slope_x * level[k, 1] + slope_y * level[k, 0])
         front = 0.5 * (1.0 + (xc - height * acc_x / gravity) / half)

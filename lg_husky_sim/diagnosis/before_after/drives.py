@@ -56,10 +56,8 @@ class Drive:
         Of the simulation [s].
     steps : int
         Of the simulation.
-    command_times, command_sum : numpy.ndarray, shapes (n,) and (n, 2)
-        Integral of the command from its first stamp to each stamp.
-    command_last : numpy.ndarray, shape (2,)
-        The command that holds from the last stamp on.
+    command : TimeSeries
+        Each held until the next.
     level : numpy.ndarray, shape (steps, 2)
         Cosine and sine of the measured heading; zeros without a pose.
     wheels : TimeSeries
@@ -75,9 +73,7 @@ class Drive:
     recording: str
     start: float
     steps: int
-    command_times: FloatArray
-    command_sum: FloatArray
-    command_last: FloatArray
+    command: TimeSeries
     level: FloatArray
     wheels: TimeSeries
     begin: FloatArray
@@ -86,9 +82,7 @@ class Drive:
 
     def largest_command(self, column: int) -> float:
         """Return the largest command forward or in yaw (0 or 1), of either sign [m/s, rad/s]."""
-        gaps = np.diff(self.command_times)
-        sent = np.diff(self.command_sum[:, column])[gaps > 0.0] / gaps[gaps > 0.0]
-        return float(np.max(np.abs([*sent, self.command_last[column]])))
+        return float(np.max(np.abs(self.command.values[:, column])))
 
 
 def _binned(times: FloatArray, values: FloatArray, start: float, width: float) -> Bins:
@@ -142,8 +136,6 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
     steps = int(np.floor((end - start) / step))
     middle = start + step * (np.arange(steps) + 0.5)
     command = streams['command']
-    gaps = np.diff(command.times)[:, None]
-    total = np.vstack([np.zeros((1, 2)), np.cumsum(command.values[:-1] * gaps, axis=0)])
     level = np.zeros((steps, 2))
     bins: dict[str, Bins] = {}
 
@@ -171,18 +163,7 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
         binned('pose', np.column_stack([pose.values[:, :2], heading]), 'place')
         at = np.interp(middle, pose.times, heading)
         level = np.column_stack([np.cos(at), np.sin(at)])
-    return Drive(name, start, steps, command.times, total, command.values[-1], level, wheels,
-                 begin, bins, gyro)
-
-
-def mean_command(drive: Drive, step: float, delay: float) -> FloatArray:
-    """Return the mean delayed command in each step, shape (steps, 2)."""
-    at = drive.start - delay + step * np.arange(drive.steps + 1)
-    beyond = np.maximum(at - drive.command_times[-1], 0.0)
-    total = np.column_stack([
-        np.interp(at, drive.command_times, drive.command_sum[:, k]) for k in range(2)])
-    total += beyond[:, None] * drive.command_last
-    return np.asarray(np.diff(total, axis=0) / step)
+    return Drive(name, start, steps, command, level, wheels, begin, bins, gyro)
 
 
 def all_drives(recordings: Sequence[Recording], step: float, widths: Mapping[str, float],

@@ -8,7 +8,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.before_after.base_robot import FIXED, ROBOT, simulate
-from lg_husky_sim.diagnosis.before_after.drives import Bins, Drive, mean_command
+from lg_husky_sim.diagnosis.before_after.commands import accepted
+from lg_husky_sim.diagnosis.before_after.drives import Bins, Drive
 from lg_husky_sim.diagnosis.before_after.settings import Quantity, Settings
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.signals import FloatArray
@@ -122,34 +123,29 @@ def base_of(settings: Settings, nominal: Parameters, given: bool = False,
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What the integrator gives: velocities, and the path of base_link."""
+    """What the integrator gives: velocities, the path of base_link, and the wheels' angles."""
 
     out: FloatArray
     path: FloatArray
+    angles: FloatArray
 
 
-def driven(base: Base, drive: Drive, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the command of each step, delayed, and the wheel rates; what is not used is zero."""
-    step = base.settings.simulation['step']
-    wheels, command = np.zeros((drive.steps + 1, 2)), np.zeros((drive.steps, 2))
-    value = x[base.names.index(_input_of(base))]
-    if base.given:
-        at = drive.start + step * np.arange(drive.steps + 1) + value
-        for k in range(2):
-            wheels[:, k] = np.interp(at, drive.wheels.times, drive.wheels.values[:, k])
-    else:
-        command = mean_command(drive, step, value)
-    return command, wheels
+def _accepted(base: Base, drive: Drive, x: FloatArray, begin: FloatArray) -> FloatArray:
+    value = dict(zip(base.names, x, strict=True))
+    wheels = base.fixed[FIXED.index('wheel_radius')] * begin[3:]
+    now = (0.5 * (wheels[0] + wheels[1]) / value['speed_gain'],
+           (wheels[1] - wheels[0]) / value['turn_width'])
+    rows = np.zeros((2, drive.steps))
+    for row, values, axis, place in zip(rows, drive.command.values.T, ('forward', 'yaw'), now,
+                                        strict=True):
+        accepted(drive.command.times, np.ascontiguousarray(values), value['dead_time'],
+                 value[f'limit_{axis}'], value[f'slew_{axis}'], place, drive.start,
+                 base.settings.simulation['step'], row)
+    return np.ascontiguousarray(rows.T)
 
 
-def _input_of(base: Base) -> str:
-    # The only parameter on which that depends.
-    return 'wheels_late' if base.given else 'dead_time'
-
-
-def moved(base: Base, drive: Drive, x: FloatArray,
-          inputs: tuple[FloatArray, FloatArray] | None = None) -> Motion:
-    """Simulate a drive; `x` in units, `inputs` by :func:`driven` where they are known."""
+def moved(base: Base, drive: Drive, x: FloatArray) -> Motion:
+    """Simulate a drive; `x` in units."""
     step = base.settings.simulation['step']
     names = base.names
     robot = np.concatenate([x[:len(ROBOT)], base.fixed])
@@ -158,7 +154,13 @@ def moved(base: Base, drive: Drive, x: FloatArray,
     mean_rim = (x[names.index('radius_left')] * begin[3]
                 + x[names.index('radius_right')] * begin[4]) / 2.0
     begin[0] = mean_rim
-    command, wheels = driven(base, drive, x) if inputs is None else inputs
+    wheels, command = np.zeros((drive.steps + 1, 2)), np.zeros((drive.steps, 2))
+    if base.given:
+        at = drive.start + step * np.arange(drive.steps + 1) + x[names.index('wheels_late')]
+        wheels = np.column_stack([np.interp(at, drive.wheels.times, column)
+                                  for column in drive.wheels.values.T])
+    else:
+        command = _accepted(base, drive, x, begin)
     simulate(robot, step, command, drive.level, wheels, base.given, begin, out)
     turn = 0.5 * step * (out[1:, 2] + out[:-1, 2])
     heading = np.concatenate([[0.0], np.cumsum(turn)])
@@ -169,7 +171,9 @@ def moved(base: Base, drive: Drive, x: FloatArray,
     path[1:, 0] = np.cumsum(cos * speed[:, 0] - sin * speed[:, 1])
     path[1:, 1] = np.cumsum(sin * speed[:, 0] + cos * speed[:, 1])
     path[:, 2] = heading
-    return Motion(out, path)
+    angles = np.zeros((drive.steps + 1, 2))
+    angles[1:] = np.cumsum(0.5 * step * (out[1:, 3:5] + out[:-1, 3:5]), axis=0)
+    return Motion(out, path, angles)
 
 
 def _at(times: FloatArray, start: float, step: float, rows: FloatArray) -> FloatArray:
@@ -196,9 +200,11 @@ def predicted(base: Base, drive: Drive, x: FloatArray, motion: Motion) -> dict[s
     value = dict(zip(base.names, x, strict=True))
     found = {}
     if not base.given and 'wheels' in drive.bins:
-        bins = drive.bins['wheels']
-        found['wheels'] = bins.mean(_at(bins.times - value['wheels_late'], drive.start, step,
-                                        motion.out[:, 3:5]))
+        bins, half = drive.bins['wheels'], 0.5 * value['wheels_window']
+        middle = bins.times - value['wheels_late']
+        before, after = (_at(middle + side, drive.start, step, motion.angles)
+                         for side in (-half, half))
+        found['wheels'] = bins.mean(after - before) / (2.0 * half)
     if 'imu' in drive.bins:
         bins = drive.bins['imu']
         rows = bins.mean(_at(bins.times - value['imu_late'], drive.start, step,
@@ -270,12 +276,11 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
         step away.
     """
     x = base.values(z)
-    inputs = driven(base, drive, x)
-    motion = moved(base, drive, x, inputs)
+    motion = moved(base, drive, x)
     there, should = measured(base, drive), predicted(base, drive, x, motion)
     columns = {name: np.zeros((*rows.shape, z.size)) for name, rows in should.items()}
     upper = base.bounds()[1]
-    other_inputs = _input_of(base)
+    moving = {*ROBOT, 'wheels_late' if base.given else 'dead_time'}
     for k, quantity in enumerate(base.settings.quantities):
         if not free[k]:
             continue
@@ -283,10 +288,7 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
         near = np.array(z)
         near[k] += delta
         changed = base.values(near)
-        if quantity.name == other_inputs:
-            path = moved(base, drive, changed)
-        else:
-            path = moved(base, drive, changed, inputs) if k < len(ROBOT) else motion
+        path = moved(base, drive, changed) if quantity.name in moving else motion
         other = predicted(base, drive, changed, path)
         diverged = base.settings.simulation['diverged']
         if all(np.all(np.abs(rows) < diverged) for rows in other.values()):

@@ -13,11 +13,12 @@ from typing import Any
 from lg_husky_sim.diagnosis.before_after import diagnose_change, prediction
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
 from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT, simulate
+from lg_husky_sim.diagnosis.before_after.commands import accepted
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
 from lg_husky_sim.diagnosis.before_after.conclusion import findings
 from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, ChangeCase
-from lg_husky_sim.diagnosis.before_after.drives import Drive, drives, mean_command
+from lg_husky_sim.diagnosis.before_after.drives import Drive, drives
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
 from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of, Motion
@@ -66,7 +67,11 @@ def driven(name: str, changes: Mapping[str, float], seed: int,
     commands = np.array([(v, w) for _, v, w in steps])[index]
     count = int(edges[-1] / STEP)
     grid = STEP * np.arange(count + 1)
-    held = commands[np.clip(np.searchsorted(times, grid[:-1] - delay, side='right') - 1, 0, None)]
+    held = np.empty((2, count))
+    for row, column, axis in zip(held, commands.T, ('forward', 'yaw'), strict=True):
+        accepted(times, np.ascontiguousarray(column), delay, values[f'limit_{axis}'],
+                 values[f'slew_{axis}'], 0.0, 0.0, STEP, row)
+    held = np.ascontiguousarray(held.T)
     out, heading = np.empty((count + 1, 7)), np.zeros(count + 1)
     robot = np.concatenate([[values[n] for n in ROBOT], base.fixed])
     # A slope needs the heading, which turns as without one.
@@ -327,14 +332,24 @@ def test_a_recording_that_is_too_short_is_refused_by_name() -> None:
         change_case([whole], [short], load_model(), silent)
 
 
-def test_a_delayed_command_is_averaged_over_each_step() -> None:
-    whole = driven('rec1', {}, 3)
-    known = settings()
-    (drive,) = drives(whole, 0.004, known.bins, 1.0, 3.0)
-    total = mean_command(drive, 0.004, 0.0)
-    later = mean_command(drive, 0.004, 0.1)
-    np.testing.assert_allclose(later[25:], total[:-25], atol=1e-9)
-    assert np.max(np.abs(total)) <= 1.4 + 1e-12
+@pytest.mark.parametrize(('late', 'most', 'slew'), [
+    (0.0, 9.0, 1e9), (0.0131, 1.2, 2.5), (0.1007, 0.7, 0.9)])
+def test_a_command_is_accepted_exactly(late: float, most: float, slew: float) -> None:
+    """As steps of a hundredth of the length say, whose error is as much smaller."""
+    rng = np.random.default_rng(5)
+    times = np.cumsum(rng.uniform(0.03, 0.9, 30))
+    values = rng.uniform(-1.5, 1.5, 30)
+    coarse, fine = np.empty(1200), np.empty(120000)
+    accepted(times, values, late, most, slew, 0.4, 0.5, 0.01, coarse)
+    place = 0.4
+    for k in range(fine.size):
+        at = np.searchsorted(times, 0.5 + 1e-4 * (k + 0.5) - late, side='right') - 1
+        target = np.clip(values[at] if at >= 0 else 0.0, -most, most)
+        before = place
+        place += np.clip(target - place, -slew * 1e-4, slew * 1e-4)
+        fine[k] = 0.5 * (before + place) if slew < 1e3 else place
+    np.testing.assert_allclose(coarse, fine.reshape(-1, 100).mean(axis=1), atol=0.016)
+    assert np.mean(np.abs(coarse - fine.reshape(-1, 100).mean(axis=1))) < 5e-4
 
 
 def test_of_every_effect_a_change_is_told_or_it_is_said_why_not() -> None:
