@@ -41,14 +41,15 @@ def said(places: Mapping[str, FloatArray], later: frozenset[str] = LATER) -> Blo
         for name, z in places.items()), ()), later)
 
 
-def recorded(seed: int, times: float = 1.0, shift: float = 0.0) -> dict[str, FloatArray]:
-    """Return recordings that deviate by so much more than assumed, and a change of one radius."""
+def recorded(seed: int, times: float = 1.0, shift: float = 0.0, number: str = 'radius_left'
+             ) -> dict[str, FloatArray]:
+    """Return recordings that deviate by so much more than assumed, and a change of one number."""
     base, rng = body(), np.random.default_rng(seed)
     deviation = np.array([q.recording for q in settings().quantities])
     places = {name: base.start + times * deviation * rng.standard_normal(deviation.size)
               for name in NAMES}
     for name in LATER:
-        places[name][base.names.index('radius_left')] += shift
+        places[name][base.names.index(number)] += shift
     return places
 
 
@@ -64,6 +65,19 @@ def test_a_change_among_deviations_is_named() -> None:
     assert (best.change.effect, best.change.side) == ('wheel_radius_mismatch', 'left')
     assert is_beyond_chance(best, settings().decision)
     assert best.shift[0] == pytest.approx(0.03, rel=0.1)
+
+
+@pytest.mark.parametrize(('shift', 'named'), [(40.0, True), (-40.0, False)])
+def test_nothing_changes_to_where_it_cannot_be(shift: float, named: bool) -> None:
+    """A drag that pushes neither has a name nor is it something that has changed."""
+    block = said(recorded(1, 1.0, shift, 'drag'))
+    best = block.candidates[0]
+    assert ((best.change.effect, is_beyond_chance(best, settings().decision))
+            == ('quadratic_drag', True)) is named
+    assert (block.anything > 100.0) is named
+    if not named:
+        assert 'quadratic_drag' not in {one.change.effect for one in block.candidates}
+        assert not is_beyond_chance(best, settings().decision)
 
 
 def test_a_difference_between_other_recordings_is_no_change() -> None:
