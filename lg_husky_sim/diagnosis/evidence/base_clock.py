@@ -19,12 +19,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Clock, Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import observe, Reading, simulate
-from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, TimeSeries
@@ -359,38 +357,3 @@ def ticking(evidence: Evidence, fit: Fit) -> list[Drive] | None:
     if sum(t.cost(clocks[k]) - t.cost(None) for k, t in tickers.items()) >= 0.0:
         return None
     return [_ticked(drive, clocks[k]) if k in clocks else drive for k, drive in enumerate(plain)]
-
-
-def any_lateness(point: Point) -> Point:
-    """Return a point whose commands may be as late as the slowest ticks would make them."""
-    late = setting('clock_longest')
-    return replace(point, unknowns=tuple(
-        replace(u, deviation=late, own=late, room=late, lower=u.prompt - late,
-                upper=u.prompt + late) if u.name == 'command_delay' else u
-        for u in point.unknowns))
-
-
-def gain_by_chance(drives: Sequence[Drive]) -> float:
-    """
-    Return what ticks gain on a base without any, once in as many as false alarms are allowed.
-
-    In a drive that lasts T, rates 1/T apart and phases a deviation d of the phase apart are trials
-    of their own: for rates from f1 to f2 there are N = T (f2 - f1) / d, and ticks of none of them
-    gain more than::
-
-        log N, summed over the drives, - log(rate of false alarms)
-
-    Parameters
-    ----------
-    drives : sequence of Drive
-        With the ticks that are likeliest.
-
-    Returns
-    -------
-    float
-        [nats].
-    """
-    band = 1.0 / setting('clock_shortest') - 1.0 / setting('clock_longest')
-    trials = [(d.end - d.start) * band / setting('clock_phase')
-              for d in drives if d.clock is not None]
-    return sum(math.log(max(n, 1.0)) for n in trials) - math.log(setting('false_alarm_rate'))

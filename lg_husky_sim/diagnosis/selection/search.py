@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from lg_husky_sim.diagnosis.evidence.base_clock import any_lateness, gain_by_chance, ticking
+from lg_husky_sim.diagnosis.evidence.base_clock import ticking
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -28,6 +28,7 @@ from lg_husky_sim.diagnosis.selection.rounds import (
     with_jitter,
 )
 from lg_husky_sim.diagnosis.selection.screening import Look, look
+from lg_husky_sim.diagnosis.selection.ticks import ticks_are_likelier
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -238,10 +239,9 @@ def _at_ticks(known: _Recalibrated, start: Point, progress: Progress) -> _Recali
     start = replace(start, unknowns=(*start.unknowns, *own),
                     places=np.append(start.places, start_of(own)))
     other = _recalibrated(evidence_of(drives, first.names, start, first.noise, first.pool), start)
-    # Ticks explain why some commands are later than others, not that all are late.
-    plain, ticked = (evidence.surprise(fit) for evidence, fit in (
-        calibrated(one.evidence, any_lateness(one.base.point), 1) for one in (known, other)))
-    return other if plain - ticked > gain_by_chance(drives) else None
+    likelier = ticks_are_likelier((known.evidence, known.base), (other.evidence, other.base),
+                                  drives)
+    return other if likelier else None
 
 
 def _nominal(point: Point) -> Point:

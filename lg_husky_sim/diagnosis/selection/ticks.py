@@ -1,0 +1,74 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether a base applies commands at ticks of its own, once the likeliest ticks are known.
+
+Ticks explain why some commands act later than others, not that all are late, which slow ticks of
+the right phase can mimic where a drive has few steps of the commands. So both have what all
+commands are late as free as the slowest ticks would make it, and ticks must be likelier by more
+than the best of so many would be by chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+import math
+
+from lg_husky_sim.diagnosis.evidence.drives import Drive
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.point import Point
+from lg_husky_sim.diagnosis.selection.rounds import calibrated
+from lg_husky_sim.diagnosis.settings import setting
+
+
+def ticks_are_likelier(plain: tuple[Evidence, Fit], ticked: tuple[Evidence, Fit],
+                       drives: Sequence[Drive]) -> bool:
+    """
+    Return whether ticks are accepted.
+
+    Parameters
+    ----------
+    plain, ticked : tuple of Evidence and Fit
+        Without and with them.
+    drives : sequence of Drive
+        With the ticks that are likeliest.
+    """
+    before, after = (evidence.surprise(fit) for evidence, fit in (
+        calibrated(evidence, any_lateness(fit.point), 1) for evidence, fit in (plain, ticked)))
+    return before - after > gain_by_chance(drives)
+
+
+def any_lateness(point: Point) -> Point:
+    """Return a point whose commands may be as late as the slowest ticks would make them."""
+    late = setting('clock_longest')
+    return replace(point, unknowns=tuple(
+        replace(u, deviation=late, own=late, room=late, lower=u.prompt - late,
+                upper=u.prompt + late) if u.name == 'command_delay' else u
+        for u in point.unknowns))
+
+
+def gain_by_chance(drives: Sequence[Drive]) -> float:
+    """
+    Return what ticks gain on a base without any, once in as many as false alarms are allowed.
+
+    In a drive that lasts T, rates 1/T apart and phases a deviation d of the phase apart are trials
+    of their own: for rates from f1 to f2 there are N = T (f2 - f1) / d, and ticks of none of them
+    gain more than::
+
+        log N, summed over the drives, - log(rate of false alarms)
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+        With the ticks that are likeliest.
+
+    Returns
+    -------
+    float
+        [nats].
+    """
+    band = 1.0 / setting('clock_shortest') - 1.0 / setting('clock_longest')
+    trials = [(d.end - d.start) * band / setting('clock_phase')
+              for d in drives if d.clock is not None]
+    return sum(math.log(max(n, 1.0)) for n in trials) - math.log(setting('false_alarm_rate'))
