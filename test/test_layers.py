@@ -15,7 +15,7 @@ PACKAGE = ROOT / 'lg_husky_sim'
 MAX_LINES = 400
 
 BASE = {'blas', 'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'parallel', 'resources',
-        'signals', 'yaml_files'}
+        'settings', 'signals', 'yaml_files'}
 MODEL = {'linear_graph', 'husky', 'simulation'}
 DATA = MODEL | {'recording', 'comparison', 'reporting'}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -25,6 +25,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'extras': {'errors'},
     'folders': {'errors'},
     'yaml_files': {'errors'},
+    'settings': {'errors', 'resources', 'yaml_files'},
     'blas': set(),
     'jit': {'errors', 'extras'},
     'parallel': {'errors', 'extras'},

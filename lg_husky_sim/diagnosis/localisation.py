@@ -256,9 +256,10 @@ def where_it_shows(evidence: Evidence, gain: FloatArray) -> str:
             sums[name] += float(np.sum(own[mask]))
             counts[name] += int(np.count_nonzero(mask))
     mean = total / gain.size
-    rows = sorted(((sums[n] / counts[n], WORDS[n]) for n in WORDS if counts[n] > 20
-                   and sums[n] > 0.15 * total and sums[n] / counts[n] > 1.3 * mean),
-                  reverse=True)
+    rows = sorted(((sums[n] / counts[n], WORDS[n]) for n in WORDS
+                   if counts[n] > setting('regime_readings')
+                   and sums[n] > setting('regime_share') * total
+                   and sums[n] / counts[n] > setting('regime_denser') * mean), reverse=True)
     return ' and '.join(word for _, word in rows[:2]) or 'everywhere'
 
 
