@@ -23,7 +23,7 @@ from lg_husky_sim.diagnosis.evidence.observation import (
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses, Hypothesis
-from lg_husky_sim.diagnosis.selection.rounds import calibrated, forward_step, with_jitter
+from lg_husky_sim.diagnosis.selection.rounds import attempt, calibrated, forward_step, with_jitter
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
@@ -148,6 +148,15 @@ def test_an_effect_that_is_a_delay_takes_all_of_it(
         places = np.array(with_it.places)
         places[log] = with_it.unknowns[log].upper
         again = evidence.fit(with_it.at(places)).point
+        # A first look takes only its own derivatives anew, and those that must go with them.
+        distorted = np.array(loose.places)
+        distorted[log] = loose.unknowns[log].upper
+        base = evidence.fit(loose.at(distorted), rounds=1)
+        tried = attempt(evidence, base, Hypothesis(effect, (sizes,)), [(base.point, sizes)],
+                        whole=False)
+    assert tried is not None
+    assert tried.gain > 0.0
+    assert tried.fit.point.values[number] == pytest.approx(0.03, abs=0.012)
     unknown = again.unknowns[log]
     assert again.places[log] == pytest.approx(unknown.centre, abs=0.5 * unknown.deviation)
     assert again.values[number] == pytest.approx(0.03, abs=0.006)

@@ -77,6 +77,19 @@ class Differences:
             made[k] = [slope * part for part in made[delay]]
         return made
 
+    def along(self, point: Point, which: Sequence[int]) -> list[int]:
+        """
+        Return places with those whose derivatives must be of the same point.
+
+        An effect that is a delay, beside a delay of the log whose derivative is older, could be
+        told from it by what has changed since.
+        """
+        if not any(point.unknowns[k].name in point.delays for k in which):
+            return list(which)
+        names = {u.name: k for k, u in enumerate(point.unknowns) if u.kind == 'log'}
+        late = [*self._lags(names), *(names[name] for name in APART[0] if name in names)]
+        return [*which, *(k for k in late if k not in which)]
+
     def _lags(self, names: Mapping[str, int]) -> dict[int, list[bool]]:
         # Places of the lags of commands, and whether each delays each drive.
         each = [('command_delay', d.late, d.own_lag) for d in self.drives]

@@ -134,10 +134,14 @@ class Evidence:
     def _spread(self) -> float:
         return sum(float(np.sum(np.log(w.scale))) for w in self.whiteners)
 
+    @property
+    def _differences(self) -> Differences:
+        return Differences(self.predict, self.drives, self.pool)
+
     def derivatives(self, point: Point, predicted: Sequence[FloatArray],
                     which: Sequence[int]) -> list[FloatArray]:
         """Return derivatives of the readings of each drive by some of the places."""
-        made = Differences(self.predict, self.drives, self.pool).by(point, predicted, which)
+        made = self._differences.by(point, predicted, which)
         return [np.column_stack([made[k][d] for k in which]) for d in range(len(self.drives))]
 
     def fit(self, start: Point, slopes: Sequence[FloatArray] | None = None, *,
@@ -169,7 +173,8 @@ class Evidence:
         predicted = self.predict(point)
         whitened = self.residuals(predicted) / inflation
         cost = self.cost(whitened, point)
-        which = list(range(len(point.unknowns)) if renew is None else renew)
+        which = self._differences.along(point, range(len(point.unknowns)) if renew is None
+                                        else renew)
         raw = [np.zeros((d.measured.size, len(point.unknowns))) for d in self.drives] if (
             slopes is None) else [np.array(one) for one in slopes]
         fresh = slopes is not None and renew is None
