@@ -17,12 +17,15 @@ from lg_husky_sim.recording.rosbag2 import available, Rosbag2
 from lg_husky_sim.recording.salvage import is_cut_off, salvage
 from lg_husky_sim.recording.topics import Topic
 from lg_husky_sim.recording.unpacking import BeyondLimitError, bounded, refuse_large_chunks
+from lg_husky_sim.yaml_files import shown
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
 SUFFIXES = ('.mcap', '.db3', '.bag')
 LONGEST_REASON = 200
+#: Largest stamp of 64 bits [ns].
+LATEST = 2**63 - 1
 
 
 class Bag:
@@ -61,6 +64,9 @@ class Bag:
             return
         deserialize = self._reader.deserialize
         for connection, logged, raw in self._reader.messages(connections=connections):
+            # A database holds anything in any column, and .mcap counts to twice as much.
+            if not isinstance(logged, int) or logged > LATEST:
+                raise ValueError(f'the log time {shown(logged)} is no number of nanoseconds')
             kind = connection.msgtype
             yield places[connection.topic, kind], logged, deserialize(raw, kind)
 

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 import shutil
+import sqlite3
 import time
 from typing import Any
 
@@ -118,4 +120,31 @@ def test_a_bag_whose_file_is_missing(drive: Any, tmp_path: Path) -> None:
     assert _attempt(path) == 'refused'
     shutil.rmtree(path)
     with pytest.raises(RecordingError, match='no such file'):
+        read_recording(path)
+
+
+@pytest.mark.parametrize('stamp', [b'\x17', 'soon', 1.5])
+def test_a_log_time_that_is_no_number_is_shown(
+        bag_writer: Any, tmp_path: Path, stamp: object) -> None:
+    """A database keeps texts, bytes and fractions in a column of whole numbers."""
+    writer = bag_writer('sqlite3')
+    for k in range(8):
+        writer.twist(0.1 * (k + 1), 0.5, 0.2)
+    path = writer.write(tmp_path / 'b')
+    with closing(sqlite3.connect(_storage(path))) as base:
+        base.execute('UPDATE messages SET timestamp = ? WHERE id = 3', (stamp,))
+        base.commit()
+    with pytest.raises(RecordingError) as caught:
+        read_recording(path)
+    assert f'the log time {stamp!r} is no number of nanoseconds' in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_a_log_time_beyond_64_bits_is_shown(bag_writer: Any, tmp_path: Path) -> None:
+    """An .mcap file counts nanoseconds without a sign, to twice as many as a stamp has."""
+    writer = bag_writer('mcap')
+    writer.twist(0.1, 0.5, 0.2)
+    writer.rows = [(topic, kind, 2**63, message) for topic, kind, _, message in writer.rows]
+    path = writer.write(tmp_path / 'b')
+    with pytest.raises(RecordingError, match='the log time 9223372036854775808 is no number'):
         read_recording(path)
