@@ -22,11 +22,14 @@ import sys
 from typing import Any, ClassVar
 
 from lg_husky_sim.errors import RecordingError
+from lg_husky_sim.yaml_files import shown
 import numpy as np
 from numpy.typing import NDArray
 
 #: Largest file that is read [bytes].
 LARGEST = 512_000_000
+#: Bits of the largest whole number that a float can be.
+WIDEST = 1024
 
 
 class _Kept:
@@ -47,7 +50,9 @@ class _Frame(_Kept):
 class _Dtype:
     # Stand-in of numpy.dtype: a name and a byte order, nothing else of its state.
     def __init__(self, name: Any, *rest: Any) -> None:
-        self._name, self._swapped = str(name), False
+        if not isinstance(name, str):
+            raise RecordingError('the pickle describes a dtype that is not one of numbers')
+        self._name, self._swapped = name, False
 
     def __setstate__(self, state: Any) -> None:
         if state[1] not in ('<', '>', '=', '|') or any(part is not None for part in state[2:5]):
@@ -90,12 +95,21 @@ def _array(raw: Any, dtype: Any, shape: Any, order: str) -> NDArray[Any]:
             raise RecordingError('the pickle holds an array of another size than its shape')
         made = np.empty(count, dtype=object)
         for place, cell in enumerate(raw):
-            made[place] = cell
+            made[place] = _cell(cell)
     else:
         if not isinstance(raw, (bytes, bytearray)) or len(raw) != count * kind.itemsize:
             raise RecordingError('the pickle holds an array of another size than its shape')
         made = np.frombuffer(bytes(raw), dtype=kind)
     return made.reshape(shape, order='F' if order == 'F' else 'C')
+
+
+def _cell(value: Any) -> Any:
+    # A list of two lists, each of two and so on, would be written out for ever.
+    if value is not None and not isinstance(value, (str, bytes, int, float)):
+        raise RecordingError(f'the pickle holds a {type(value).__name__} among numbers and texts')
+    if isinstance(value, int) and value.bit_length() > WIDEST:
+        raise RecordingError(f'the pickle holds a number of {value.bit_length()} bits')
+    return value
 
 
 def _empty(kind: Any, shape: Any, code: Any) -> _Array:
@@ -106,7 +120,7 @@ def _empty(kind: Any, shape: Any, code: Any) -> _Array:
 
 
 def _from_buffer(buffer: Any, dtype: Any, shape: Any, order: Any, *rest: Any) -> NDArray[Any]:
-    return _array(bytes(buffer), dtype, shape, order)
+    return _array(buffer, dtype, shape, order)
 
 
 def _values(array: Any) -> NDArray[Any]:
@@ -169,10 +183,17 @@ _ALLOWED: Mapping[tuple[str, str], Any] = {
 _PLAIN: dict[int, Callable[[Any], None]] = dict(pickle._Unpickler.dispatch)
 
 
+def _refuse_keys(target: Any, keys: Iterable[Any]) -> None:
+    # A pair of two pairs, each of two and so on, would be hashed for ever.
+    if type(target) is not dict or not all(isinstance(key, str) for key in keys):
+        raise RecordingError('the pickle holds a mapping from something else than texts')
+
+
 class _Reader(pickle._Unpickler):
     """An unpickler that knows the names of :data:`_ALLOWED` and no others."""
 
     stack: list[Any]
+    metastack: list[list[Any]]
     read: Callable[[int], bytes]
 
     def _build(self) -> None:
@@ -188,16 +209,32 @@ class _Reader(pickle._Unpickler):
             raise RecordingError(f'the pickle announces {size} bytes')
         self.stack.append(bytearray(self.read(size)))
 
+    def _item(self) -> None:
+        _refuse_keys(self.stack[-3], self.stack[-2:-1])
+        _PLAIN[pickle.SETITEM[0]](self)
+
+    def _items(self) -> None:
+        _refuse_keys(self.metastack[-1][-1], self.stack[::2])
+        _PLAIN[pickle.SETITEMS[0]](self)
+
+    def _dict(self) -> None:
+        _refuse_keys({}, self.stack[::2])
+        _PLAIN[pickle.DICT[0]](self)
+
     dispatch: ClassVar[dict[int, Callable[[Any], None]]] = {
-        **_PLAIN, pickle.BUILD[0]: _build, pickle.BYTEARRAY8[0]: _bytearray}
+        # A table has no sets.
+        **{code: load for code, load in _PLAIN.items()
+           if code not in (pickle.EMPTY_SET[0], pickle.FROZENSET[0])},
+        pickle.BUILD[0]: _build, pickle.BYTEARRAY8[0]: _bytearray, pickle.SETITEM[0]: _item,
+        pickle.SETITEMS[0]: _items, pickle.DICT[0]: _dict}
 
     def find_class(self, module_name: str, global_name: str, /) -> Any:
         try:
             return _ALLOWED[module_name, global_name]
         except KeyError:
             raise RecordingError(
-                f'the pickle names {module_name}.{global_name}, which a table of numbers has no '
-                'use for; it is refused') from None
+                f'the pickle names {shown(f"{module_name}.{global_name}")}, which a table of '
+                'numbers has no use for; it is refused') from None
 
     def persistent_load(self, pid: Any) -> Any:
         raise RecordingError('the pickle refers to something outside itself; it is refused')
@@ -263,8 +300,11 @@ def numbers(column: NDArray[Any], name: str) -> NDArray[np.float64]:
     RecordingError
         If a cell is none.
     """
-    convert: Callable[[Any], float] = float
+    return np.array([_number(cell, name) for cell in column], dtype=np.float64)
+
+
+def _number(cell: Any, name: str) -> float:
     try:
-        return np.array([convert(cell) for cell in column], dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise RecordingError(f'column {name}: {error}') from error
+        return float(cell)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise RecordingError(f'column {name}: {shown(cell)} is not a number') from error

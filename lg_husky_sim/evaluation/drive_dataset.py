@@ -96,7 +96,7 @@ def read_drive(path: str | os.PathLike[str], robot: str = 'husky') -> DriveRun:
     if {'cmd_left_0', 'icp_x_0', 'gt_icp_yaw'} <= set(columns):
         return _processed(columns, robots[robot])
     raise RecordingError(f'{path}: neither a raw nor a processed run of the DRIVE data set; '
-                         f'columns: {", ".join(list(columns)[:8])}, …')
+                         f'columns: {", ".join(map(shown, list(columns)[:8]))}, …')
 
 
 def _raw(columns: Mapping[str, NDArray[Any]]) -> DriveRun:

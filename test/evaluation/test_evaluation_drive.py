@@ -181,6 +181,10 @@ def test_stand_ins_do_not_prepare_other_calls(tmp_path: Path) -> None:
         read_columns(path)
 
 
+#: A pair of nothing twice, of that pair twice, and so on: short here, written out it is endless.
+PAIRS = b')' + b'2\x86' * 60
+
+
 @pytest.mark.parametrize(('pickled', 'message'), [
     # 22 GB of bytes, a name with 4 billion places before it: memory for either.
     (b'\x80\x05\x96\x00\x00\x00\x40\x05\x00\x00\x00abc.', 'announces 22548578304 bytes'),
@@ -193,6 +197,22 @@ def test_stand_ins_do_not_prepare_other_calls(tmp_path: Path) -> None:
     (b'\x80\x04\x8e\x01', 'not a pickled table'),
     # The state of a function.
     (b'\x80\x04cnumpy._core.multiarray\n_reconstruct\n}b.', 'changes something'),
+    # 4 GB for a buffer that is a number.
+    (b'\x80\x04cnumpy._core.numeric\n_frombuffer\n(J\x00\x00\x00\x7fcnumpy\ndtype\n(\x8c\x02u1tR'
+     b'J\x00\x00\x00\x7f\x85\x8c\x01CtR.', 'another size'),
+    # Pairs of pairs of pairs: as a key, as a name of a dtype, as a cell, in a set.
+    (b'\x80\x04}' + PAIRS + b'K\x01s.', 'mapping from something else'),
+    (b'\x80\x04}(' + PAIRS + b'K\x01u.', 'mapping from something else'),
+    (b'\x80\x04(' + PAIRS + b'K\x01d.', 'mapping from something else'),
+    (b'\x80\x04cnumpy\ndtype\n' + PAIRS + b'\x85R.', 'not one of numbers'),
+    (pickle.dumps(np.array([None, 'x'], dtype=object)).replace(b'\x8c\x01x', PAIRS),
+     'holds a tuple among'),
+    (b'\x80\x04\x8f(' + PAIRS + b'\x90.', 'not a pickled table'),
+    # What a table holds is no mapping either.
+    (pickle.dumps(np.zeros(1, dtype=object))[:-1] + b'K\x00)s.', 'mapping from something else'),
+    (pickle.dumps(np.array([1 << 5000, None], dtype=object)), 'a number of 5001 bits'),
+    # A name of two lines.
+    (b'\x80\x04\x8c\x05numpy\x8c\x05l\noad\x93.', r"names 'numpy\.l\\noad', which"),
 ])
 def test_a_hostile_pickle_takes_no_memory_and_ends_no_process(
         tmp_path: Path, pickled: bytes, message: str) -> None:
@@ -234,7 +254,9 @@ def test_missing_columns_and_robots_are_named(pandas: types.SimpleNamespace, tmp
         read_drive(write(pandas, tmp_path / 'a.pkl', columns))
     with pytest.raises(RecordingError, match='neither a raw nor a processed run'):
         read_drive(write(pandas, tmp_path / 'b.pkl', {'x': ['1', '2']}))
-    with pytest.raises(RecordingError, match='column cmd_vel_x'):
+    with pytest.raises(RecordingError, match=r"^column cmd_vel_x: 'fast' is not a number$"):
         read_drive(write(pandas, tmp_path / 'c.pkl', raw() | {'cmd_vel_x': ['fast'] * 200}))
+    with pytest.raises(RecordingError, match=r"columns: 'x\\ny', …$"):
+        read_drive(write(pandas, tmp_path / 'd.pkl', {'x\ny': ['1', '2']}))
     with pytest.raises(SettingsError, match='there are husky, warthog'):
         read_drive(tmp_path / 'a.pkl', 'jackal')
