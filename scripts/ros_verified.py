@@ -4,15 +4,18 @@
 Run the contract tests and the ros2 command line on a real ROS 2, and write what they said.
 
 Usage, with ROS 2 sourced:
-``python scripts/ros_verified.py [--embedded PYTHON] [--no-tests] [--no-stacks]``. The part of
+``python scripts/ros_verified.py [--embedded PYTHON] [--only WORDS]``. The part of
 docs/ros_verified.md between its markers is made anew, for every RMW that is installed; PYTHON is
-an interpreter without ROS, for the embedded backend. The tests of other stacks print their
-figures, which are copied; of a stack that is not installed they say so.
+an interpreter without ROS, for the embedded backend. With WORDS, only the sections with these in
+their heading; the others stay as they are. The tests of other stacks print their figures, which
+are copied; of a stack that is not installed they say so.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 import os
 from pathlib import Path
@@ -34,7 +37,8 @@ PACKAGES = ('rclpy', 'rcl', *RMWS, 'cyclonedds', 'fastrtps', 'sensor_msgs', 'nav
             'robot_localization', 'robot_state_publisher', 'teleop_twist_keyboard', 'twist_mux',
             'nav2_planner', 'nav2_navfn_planner', 'nav2_controller', 'nav2_costmap_2d',
             'nav2_regulated_pure_pursuit_controller', 'nav2_rotation_shim_controller',
-            'nav2_behaviors', 'nav2_bt_navigator', 'behaviortree_cpp')
+            'nav2_behaviors', 'nav2_bt_navigator', 'behaviortree_cpp',
+            'nav2_velocity_smoother', 'nav2_collision_monitor')
 WHEELS = ('numpy', 'numba', 'rosbags', 'cyclonedds', 'pytest')
 #: ROS' own plugins do not know the newest pytest.
 PLUGINS = ('-p', 'no:cacheprovider', '-p', 'no:launch_testing', '-p', 'no:launch_ros',
@@ -101,17 +105,17 @@ def tested(python: str, environment: dict[str, str]) -> tuple[str, list[str]]:
 
 
 def stack(rmw: str) -> str:
-    """Run the tests of other stacks; return their figures, what was left out and the result."""
+    """Return the command of the tests of other stacks, their figures, omissions and the result."""
     lines = said_by_pytest(sys.executable, STACKS, os.environ | {'RMW_IMPLEMENTATION': rmw})
     shown = [line.partition(FIGURE)[2] for line in lines if FIGURE in line]
     shown += [re.sub(r' - .*', '', line) for line in lines
               if line.startswith(('FAILED', 'ERROR', 'SKIPPED'))]
     shown.append(re.sub(r'^=+ | =+$', '', lines[-1]))
-    return '\n'.join([f'{rmw}:', '', '```', *shown, '```'])
+    return '\n'.join([f'    python {" ".join(STACKS)}', '', '```', *shown, '```'])
 
 
 def tests_table(rmws: list[str], embedded: str | None) -> str:
-    """Run the contract tests on each backend; return a Markdown table."""
+    """Run the contract tests on each backend; return the command and a Markdown table."""
     rows, lost = [], []
     for rmw in rmws:
         said, failed = tested(sys.executable, os.environ | {'RMW_IMPLEMENTATION': rmw})
@@ -124,7 +128,8 @@ def tests_table(rmws: list[str], embedded: str | None) -> str:
         rows.append(('embedded', said))
         lost += [f'- embedded: `{line}`' for line in failed]
     table = ['| backend | result |', '| --- | --- |', *(f'| {a} | {b} |' for a, b in rows)]
-    return '\n'.join([*table, *(['', 'Failed:', '', *lost] if lost else [])])
+    return '\n'.join([f'    python {" ".join(PYTEST)}', '', *table,
+                      *(['', 'Failed:', '', *lost] if lost else [])])
 
 
 def answered(command: str, environment: dict[str, str]) -> str:
@@ -170,30 +175,36 @@ def session(rmw: str, domain: int) -> str:
         f'{process.returncode})', '```', '', '```', *lines, '```'])
 
 
+def sections(text: str) -> dict[str, str]:
+    """Return what stands below each heading."""
+    pieces = [piece.partition('\n') for piece in text.strip().split('\n## ')]
+    return {heading.removeprefix('## '): body.strip('\n') for heading, _, body in pieces}
+
+
 def main() -> int:
     """Run all that there is, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--embedded', help='an interpreter without ROS')
-    parser.add_argument('--no-tests', action='store_true', help='without the contract tests')
-    parser.add_argument('--no-stacks', action='store_true', help='without those of other stacks')
+    parser.add_argument('--only', default='', help='words of the headings of what is made anew')
     words = parser.parse_args()
     packages = package_versions()
     rmws = [name for name in RMWS if name in packages]
     if not rmws:
         print('error: no RMW is installed; source the setup file of ROS 2', file=sys.stderr)
         return 1
-    parts = ['## Versions', versions_table(packages)]
-    if missing := [name for name in RMWS if name not in rmws]:
-        parts.append(f'Not installed, and not run here: {", ".join(missing)}.')
-    if not words.no_tests:
-        parts += ['## Contract tests', f'    python {" ".join(PYTEST)}',
-                  tests_table(rmws, words.embedded)]
-    if not words.no_stacks:
-        parts += ['## Other stacks', f'    python {" ".join(STACKS)}', *map(stack, rmws)]
-    for place, rmw in enumerate(rmws):
-        parts += [f'## The command line, {rmw}', session(rmw, 60 + place)]
+    missing = [name for name in RMWS if name not in rmws]
+    makers: dict[str, Callable[[], str]] = {
+        'Versions': lambda: '\n\n'.join([versions_table(packages), *(
+            [f'Not installed, and not run here: {", ".join(missing)}.'] if missing else [])]),
+        'Contract tests': partial(tests_table, rmws, words.embedded)}
+    makers |= {f'Other stacks, {rmw}': partial(stack, rmw) for rmw in rmws}
+    makers |= {f'The command line, {rmw}': partial(session, rmw, 60 + place)
+               for place, rmw in enumerate(rmws)}
     before, _, rest = PAGE.read_text(encoding='utf-8').partition(MARKERS[0])
-    _, _, after = rest.partition(MARKERS[1])
+    made, _, after = rest.partition(MARKERS[1])
+    kept = sections(made)
+    parts = [f'## {heading}\n\n{make() if words.only in heading else kept[heading]}'
+             for heading, make in makers.items() if words.only in heading or heading in kept]
     PAGE.write_text('\n'.join([f'{before}{MARKERS[0]}', '', '\n\n'.join(parts), '',
                                f'{MARKERS[1]}{after}']), encoding='utf-8')
     return 0
