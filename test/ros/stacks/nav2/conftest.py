@@ -3,10 +3,10 @@
 """
 Nav2, unmodified, in a room with two pillars, and what asks it to drive.
 
-With bt_navigator and the behaviours where they are installed, without them where they are not;
-its parameters are in `stack.yaml`. Its loops are timed by the system's clock: they are made faster
-by `speed`, and a node in lock step makes its steps when Nav2 has sent a command, however long that
-takes on a busy machine.
+With bt_navigator and the behaviours, and with velocity smoother and collision monitor, where they
+are installed, without them where they are not; its parameters are in `stack.yaml`. Its loops are
+timed by the system's clock: they are made faster by `speed`, and a node in lock step makes its
+steps when Nav2 has sent a command, however long that takes on a busy machine.
 """
 
 from __future__ import annotations
@@ -35,6 +35,9 @@ STACK = Path(__file__).with_name('stack.yaml')
 PACKAGES = {'map_server': 'nav2_map_server', 'planner_server': 'nav2_planner',
             'controller_server': 'nav2_controller'}
 DECIDING = {'behavior_server': 'nav2_behaviors', 'bt_navigator': 'nav2_bt_navigator'}
+#: Of those through which all commands go, in this order, on their way to the base.
+CHAIN = {'velocity_smoother': 'nav2_velocity_smoother',
+         'collision_monitor': 'nav2_collision_monitor'}
 MANAGER = {'lifecycle_manager': 'nav2_lifecycle_manager'}
 #: Packages of plug-ins that `stack.yaml` names.
 PLUGINS = ('nav2_navfn_planner', 'nav2_rotation_shim_controller',
@@ -185,8 +188,9 @@ class Navigator:
         node: Any = probe.node
         self.asked = import_module('std_srvs.srv').Trigger
         self.manager = node.create_client(self.asked, 'lifecycle_manager/is_active')
-        #: Whether bt_navigator is there, and how often its behaviours had to help.
-        self.deciding = False
+        #: Whether bt_navigator is there, whether commands go through velocity smoother and
+        #: collision monitor, and how often the behaviours had to help.
+        self.deciding = self.chained = False
         self.recoveries = 0
 
     def close(self) -> None:
@@ -310,18 +314,17 @@ class Navigator:
         self.probe.until(lambda: not self.manager.service_is_ready(), ENDED)
 
 
-@pytest.fixture
-def deciding() -> bool:
-    """Return whether bt_navigator and the behaviours are installed."""
+def installed(nodes: dict[str, str]) -> dict[str, str]:
+    """Return nodes with their packages, or none where any of these is not installed."""
     if find_spec('ament_index_python') is None:
-        return False
-    packages = import_module('ament_index_python.packages')
-    return set(DECIDING.values()) <= set(packages.get_packages_with_prefixes())
+        return {}
+    packages = import_module('ament_index_python.packages').get_packages_with_prefixes()
+    return nodes if set(nodes.values()) <= set(packages) else {}
 
 
 @pytest.fixture
 def nav2(probe: Probe, run: Callable[..., Any], program: Callable[[str, str], Path],
-         deciding: bool, tmp_path: Path) -> Iterator[Callable[..., Navigator]]:
+         tmp_path: Path) -> Iterator[Callable[..., Navigator]]:
     """Return a starter of Nav2 beside a node that runs."""
     # Looked for before the test starts anything: without them it is skipped.
     for name, package in (PACKAGES | MANAGER).items():
@@ -332,15 +335,19 @@ def nav2(probe: Probe, run: Callable[..., Any], program: Callable[[str, str], Pa
 
     def start_all(speed: float = 1.0, frequency: float | None = None, whole: bool = True,
                   lock_step: LockStep | None = None) -> Navigator:
-        nodes = PACKAGES | (DECIDING if whole and deciding else {})
+        # The smoother repeats commands by the system's clock, which a lock step must not follow.
+        chain = {} if lock_step else installed(CHAIN)
+        nodes = PACKAGES | chain | (installed(DECIDING) if whole else {})
+        commands = 'cmd_vel_nav' if chain else 'platform/cmd_vel'
         programs = [program(package, name) for name, package in (nodes | MANAGER).items()]
         stack = write_stack(tmp_path, nodes, speed, frequency)
         made.append(Navigator(probe, lock_step))
-        made[-1].deciding = len(nodes) > len(PACKAGES)
+        made[-1].deciding = set(DECIDING) <= set(nodes)
+        made[-1].chained = bool(chain)
         assert probe.until(lambda: made[-1].truth)
         for _ in range(STARTS):
             running = [run(path, '--ros-args', '--params-file', stack,
-                           '-r', 'cmd_vel:=platform/cmd_vel') for path in programs]
+                           '-r', f'cmd_vel:={commands}') for path in programs]
             if made[-1].started():
                 return made[-1]
             for process in running:

@@ -5,7 +5,8 @@ Goals in a room by Nav2, unmodified, with the node in place of Gazebo.
 
 NavFn plans, rotation shim and regulated pure pursuit drive, both costmaps take the node's scan,
 map to odom is the node's, and bt_navigator and the behaviours decide. Where those two are not
-installed, the test asks for plans and for their pursuit, and once more where that failed.
+installed, the test asks for plans and for their pursuit, and once more where that failed. By the
+clock, commands go through velocity smoother and collision monitor, where those are installed.
 """
 
 from __future__ import annotations
@@ -68,7 +69,8 @@ def drive(navigator: Any, count: int, title: str) -> int:
         if done and all(left < NEAR and abs(turn) < ALIGNED for left, turn in off):
             taken.append(seconds)
             most = [max(most[0], off[1][0]), max(most[1], abs(off[1][1]))]
-    print(f'figure: {title}{"" if navigator.deciding else ", without bt_navigator"}: '
+    print(f'figure: {title}{", with smoother and collision monitor" if navigator.chained else ""}'
+          f'{"" if navigator.deciding else ", without bt_navigator"}: '
           f'{len(taken)} of {count} goals, mean {sum(taken) / max(len(taken), 1):.1f} s, longest '
           f'{max(taken, default=0.0):.1f} s; at most {most[0]:.2f} m and {most[1]:.2f} rad from '
           f'them, {navigator.recoveries} recoveries, never nearer than {least:.2f} m')
