@@ -158,6 +158,26 @@ def future() -> Any:
     return Future()
 
 
+def waiting_service(node: Node, kind: Any, name: str, callback: Callable[[Any, Any], Any]
+                    ) -> None:
+    """
+    Offer a service whose callback waits for others of the node; rclpy only.
+
+    It has a group of its own: in that of the others, which excludes each other, none of them would
+    be called until it ends. What it starts must therefore be left to :func:`trigger`.
+    """
+    from rclpy.callback_groups import ReentrantCallbackGroup
+    real: Any = node
+    real.create_service(kind, name, callback, callback_group=ReentrantCallbackGroup())
+
+
+def trigger(node: Node, callback: Callable[[], None]) -> Callable[[], None]:
+    """Return what has a callback called soon, excluding all others of the node; rclpy only."""
+    real: Any = node
+    found: Callable[[], None] = real.create_guard_condition(callback).trigger
+    return found
+
+
 def own_arguments(words: Sequence[str]) -> list[str]:
     """Return what of a command line is outside its --ros-args sections."""
     own, inside = [], False
@@ -254,5 +274,7 @@ __all__ = [
     'spin',
     'spin_once',
     'steady_timer',
+    'trigger',
     'try_shutdown',
+    'waiting_service',
 ]

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 import math
 from typing import Any, Protocol
@@ -89,6 +90,7 @@ class StandardControl:
     def __init__(self, node: Node, simulation: Simulation) -> None:
         """Offer the services, or say that the package is missing."""
         self._simulation = simulation
+        self._asked: deque[tuple[int, Any]] = deque()
         answers = {
             'GetSimulatorFeatures': self._features, 'GetSimulationState': self._get_state,
             'SetSimulationState': self._set_state, 'ResetSimulation': self._reset,
@@ -99,7 +101,11 @@ class StandardControl:
             if service is None:
                 node.get_logger().info(f'no services of {_PACKAGE}: not available here')
                 return
-            node.create_service(service, service_name(kind), answers[kind])
+            if kind == 'StepSimulation':
+                self._trigger = api.trigger(node, self._begin)
+                api.waiting_service(node, service, service_name(kind), answers[kind])
+            else:
+                node.create_service(service, service_name(kind), answers[kind])
 
     def _features(self, request: Any, response: Any) -> Any:
         kind = message_type(f'{_PACKAGE}/msg/SimulatorFeatures')
@@ -157,11 +163,20 @@ class StandardControl:
             response.result.error_message = f'steps = {request.steps}: from 1 to {MOST_STEPS}'
         else:
             future = api.future()
-            self._simulation.advance(int(request.steps), future.set_result)
+            self._asked.append((int(request.steps), future))
+            self._trigger()
             if not await future:
                 response.result.result = _FAILED
                 response.result.error_message = 'interrupted by a pause, a resume or a reset'
         return response
+
+    def _begin(self) -> None:
+        while self._asked:
+            steps, future = self._asked.popleft()
+            if self._simulation.paused:
+                self._simulation.advance(steps, future.set_result)
+            else:
+                future.set_result(False)
 
     def _entities(self, request: Any, response: Any) -> Any:
         response.entities = [ENTITY]

@@ -103,6 +103,14 @@ def test_simulation_interfaces(probe: Probe, start: Start) -> None:
     truth.clear()
     assert (step(5), step(0)) == (1, 4)
     assert probe.until(lambda: len(truth) == 5)
+
+    def now() -> int:
+        told = call(f'{package}/GetEntityState', 'get_entity_state', entity='husky').state
+        return int(told.header.stamp.sec * 10**9 + told.header.stamp.nanosec)
+
+    begun = now()
+    # Far longer than a bunch of 20 ms: others are served meanwhile, the node's own timer too.
+    assert (step(1000), now() - begun, state()) == (1, 20 * 10**9, 2)
     assert call(f'{package}/GetEntities', 'get_entities').entities == ['husky']
     unknown = call(f'{package}/GetEntityState', 'get_entity_state', entity='dog')
     assert unknown.result.result == 2
