@@ -22,7 +22,7 @@ import pytest
 
 PARAMETERS = Path(__file__).resolve().parents[4] / 'config' / 'nav2.yaml'
 #: Goals by the clock, and as fast as Nav2 goes: how many, and how many must be reached.
-SEED, LIVE, GOALS, REACHED = 20, 4, 50, 49
+SEED, LIVE, GOALS, REACHED = 20, 10, 50, 49
 #: How much faster Nav2's loops are made at most, steps of 20 ms for each of its commands, of which
 #: 20 come in a second of simulated time, and how long it may send none until time goes on [s].
 SPEED, EVERY, HELD = 4.0, 2.5, 0.1
