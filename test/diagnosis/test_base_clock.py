@@ -16,8 +16,10 @@ from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, Noise
 from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.point import beginning
-from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, start_of, tick_unknowns
 from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.selection.rounds import calibrated
+from lg_husky_sim.diagnosis.selection.ticks import ticks_are_likelier
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
@@ -81,6 +83,18 @@ def test_the_period_of_a_base_is_found_from_two_drives(made: Made, pool: Executo
         true = at_ticks(recording.streams['command'], PERIOD, 0.011 * number)
         apart = np.abs(drive.commands.times[:, None] - true.times).min(axis=1)
         assert np.quantile(apart, 0.9) < 0.004
+    own = tick_unknowns(found)
+    ticked = calibrated(evidence_of(found, ['one', 'two'], start, noise, pool), replace(
+        start, unknowns=(*start.unknowns, *own), places=np.append(start.places, start_of(own))), 1)
+    plain = calibrated(evidence, start, 1)
+    assert ticks_are_likelier(plain, ticked, found)
+    assert not ticks_are_likelier(ticked, plain, found)
+    # Not beside a robot that is as none can be: something else is missing then.
+    places = np.array(ticked[1].point.places)
+    mass = next(k for k, u in enumerate(start.unknowns) if u.name == 'mass')
+    places[mass] += 8.0 * start.unknowns[mass].deviation
+    distorted = ticked[0].fit(ticked[1].point.at(places), rounds=0)
+    assert not ticks_are_likelier(plain, (ticked[0], distorted), found)
     quiet = evidence_of(drives, ['one', 'two'], start, replace(guess, values={
         **guess.values, 'command_jitter': 1e-4}), pool)
     assert ticking(quiet, quiet.fit(start, rounds=1)) is None
