@@ -200,6 +200,9 @@ def main() -> int:
     makers |= {f'Other stacks, {rmw}': partial(stack, rmw) for rmw in rmws}
     makers |= {f'The command line, {rmw}': partial(session, rmw, 60 + place)
                for place, rmw in enumerate(rmws)}
+    if not any(words.only in heading for heading in makers):
+        print(f'error: --only {words.only!r} is in none of: {", ".join(makers)}', file=sys.stderr)
+        return 2
     before, _, rest = PAGE.read_text(encoding='utf-8').partition(MARKERS[0])
     made, _, after = rest.partition(MARKERS[1])
     kept = sections(made)

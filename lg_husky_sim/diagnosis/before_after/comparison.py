@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 import math
 
-from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic, Solution
+from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import Prior
 from lg_husky_sim.diagnosis.before_after.judge import exchange_chance
 from lg_husky_sim.diagnosis.before_after.prediction import Base
@@ -110,10 +110,10 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     numbers, n = comparison.numbers, comparison.index.size
     evidence = comparison.evidence(comparison.quadratics, later)
     candidates = comparison.candidates(evidence)
-    where, every = comparison.possible(evidence, comparison.everything)
+    every = evidence.solve(comparison.everything)
     anything = every.evidence - evidence.nothing
     all_of_it = np.zeros(n)
-    all_of_it[where] = every.shift
+    all_of_it[comparison.everything] = every.shift
     gains, wholes = [], []
     best = comparison.shift(evidence, candidates[0].parameters) if candidates else np.zeros(n)
     for way in partitions([q.recording for q in fits.quadratics], later,
@@ -121,8 +121,7 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
         weighed = comparison.candidates(comparison.evidence(comparison.without(best, later), way))
         gains.append(weighed[0].gain if weighed else 0.0)
         other = comparison.evidence(comparison.without(all_of_it, later), way)
-        wholes.append(comparison.possible(other, comparison.everything)[1].evidence
-                      - other.nothing)
+        wholes.append(other.solve(comparison.everything).evidence - other.nothing)
     shared, moved = every.shared, all_of_it
     if adopted:
         shared, moved = evidence.solve(comparison.changed).shared, comparison.shift(evidence, ())
@@ -236,8 +235,7 @@ class _Comparison:
         self.index = np.flatnonzero(fits.prior.free)
         self.quadratics = [one.among(self.index) for one in fits.quadratics]
         quantities = fits.base.settings.quantities
-        self._called = [quantities[k].name for k in self.index]
-        self._place = {name: i for i, name in enumerate(self._called)}
+        self._place = {quantities[k].name: i for i, k in enumerate(self.index)}
         # Delays of all streams are none: that of the reference is left out where all may differ.
         self.everything = np.array([i for i, k in enumerate(self.index)
                                     if k != fits.base.reference], dtype=np.intp)
@@ -278,31 +276,15 @@ class _Comparison:
         """Return the evidence with the deviations that recordings of these sets have."""
         base, index, prior = self.fits.base, self.index, self.fits.prior
         quantities, numbers = base.settings.quantities, base.settings.fit
+        lower, upper = base.bounds()
         return Evidence(
             [replace(one, after=one.recording in later) for one in quadratics],
             prior.mean[index], prior.sd[index],
             np.array([quantities[k].recording for k in index]),
-            np.array([quantities[k].change for k in index])).estimated(
+            np.array([quantities[k].change for k in index]),
+            (lower[index], upper[index])).estimated(
                 numbers['recordings_body' if base.given else 'recordings_loop'],
                 int(numbers['recording_rounds']), numbers['recording_free'])
-
-    def possible(self, evidence: Evidence, own: NDArray[np.intp],
-                 adopted: NDArray[np.intp] | None = None) -> tuple[NDArray[np.intp], Solution]:
-        """
-        Return which parameters differ, beside those adopted, and what is likeliest then.
-
-        What would have to change to where it cannot be, such as a drag that pushes, has not
-        changed.
-        """
-        lower, upper = (bound[self.index] for bound in self.fits.base.bounds())
-        before = own[:0] if adopted is None else adopted
-        while True:
-            solved = evidence.solve(np.concatenate([before, own]))
-            after = solved.shared[own] + solved.shift[before.size:]
-            inside = (lower[own] <= after) & (after <= upper[own])
-            if np.all(inside):
-                return own, solved
-            own = own[inside]
 
     def candidates(self, evidence: Evidence) -> list[Candidate]:
         """
@@ -310,17 +292,15 @@ class _Comparison:
 
         Of a change that shares parameters with what is adopted, only the others are weighed.
         """
-        base, found, count = self.fits.base, [], self.changed.size
+        base, found, count = self.fits.base, [], len(self._adopted)
         known = evidence.solve(self.changed).evidence
         for change in base.settings.changes:
-            own = self.places([name for name in self._names(change)
-                               if name not in self._adopted])
-            if base.given and change.block != 'body':
+            names = tuple(name for name in self._names(change) if name not in self._adopted)
+            if (base.given and change.block != 'body') or not names:
                 continue
-            own, solved = self.possible(evidence, own, self.changed)
-            if own.size:
-                found.append(Candidate(
-                    change, tuple(self._called[i] for i in own), solved.evidence - known,
-                    solved.shared[own], solved.shift[count:],
-                    np.sqrt(np.diag(solved.covariance)[count:]), 1.0))
+            changed = self.places((*self._adopted, *names))
+            solved = evidence.solve(changed)
+            found.append(Candidate(
+                change, names, solved.evidence - known, solved.shared[changed[count:]],
+                solved.shift[count:], np.sqrt(np.diag(solved.covariance)[count:]), 1.0))
         return sorted(found, key=lambda one: -one.gain)

@@ -11,6 +11,7 @@ from functools import cached_property
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import log_ndtr
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +108,8 @@ class Evidence:
         Deviations from recording to recording.
     change_sd : numpy.ndarray, shape (n,)
         Prior of a change.
+    bounds : tuple of numpy.ndarray, optional
+        Least and largest values, shapes (n,), of what has changed; none if not given.
     """
 
     quadratics: Sequence[Quadratic]
@@ -114,6 +117,7 @@ class Evidence:
     sd: FloatArray
     recording_sd: FloatArray
     change_sd: FloatArray
+    bounds: tuple[FloatArray, FloatArray] | None = None
 
     def estimated(self, weight: float, rounds: int, free: float) -> Evidence:
         """
@@ -158,9 +162,26 @@ class Evidence:
         return replace(found, change_sd=self.change_sd)
 
     def solve(self, changed: NDArray[np.intp]) -> Solution:
-        """Return the solution where the parameters of these indices differ after."""
+        """
+        Return the solution where the parameters of these indices differ after.
+
+        With bounds, their prior and with it the likelihood count inside only. For a parameter
+        whose value after is a with standard deviation s, and was b before a change of prior c, the
+        evidence is larger by::
+
+            log P(lower < N(a, s) < upper) - log P(lower < N(b, c) < upper)
+
+        and where a is outside, the solution is the likeliest with a at its bound.
+        """
         n = self.mean.size
         at, covariance, evidence = self._posterior(changed)
+        if self.bounds is not None and changed.size:
+            level = np.hstack([np.eye(n)[changed], np.eye(changed.size)])
+            lower, upper = (bound[changed] for bound in self.bounds)
+            sd = np.sqrt(np.diag(level @ covariance @ level.T))
+            evidence += _inside(level @ at, sd, lower, upper) - _inside(
+                np.clip(at[changed], lower, upper), self.change_sd[changed], lower, upper)
+            at = _bounded(at, covariance, level, lower, upper)
         return Solution(evidence, at[:n], at[n:], np.asarray(covariance[n:, n:], dtype=np.float64))
 
     @cached_property
@@ -208,3 +229,23 @@ def joined(parts: Sequence[Quadratic]) -> list[Quadratic]:
             part.recording, part.after, there.curvature + part.curvature,
             there.slope + part.slope, there.cost + part.cost)
     return list(found.values())
+
+
+def _inside(value: FloatArray, sd: FloatArray, lower: FloatArray, upper: FloatArray) -> float:
+    # Log probability; of two bounds far apart for their deviations.
+    return float(np.sum(log_ndtr((value - lower) / sd) + log_ndtr((upper - value) / sd)))
+
+
+def _bounded(at: FloatArray, covariance: FloatArray, level: FloatArray, lower: FloatArray,
+             upper: FloatArray) -> FloatArray:
+    # The likeliest with what is outside at its bound: a Gaussian given some of its values.
+    held, found = np.zeros(lower.size, dtype=bool), at
+    while True:
+        value = level @ found
+        outside = ((value < lower) | (value > upper)) & ~held
+        if not np.any(outside):
+            return found
+        held |= outside
+        rows = level[held]
+        found = at - covariance @ rows.T @ np.linalg.solve(
+            rows @ covariance @ rows.T, rows @ at - np.clip(level @ at, lower, upper)[held])

@@ -75,9 +75,21 @@ def test_nothing_changes_to_where_it_cannot_be(shift: float, named: bool) -> Non
     assert ((best.change.effect, is_beyond_chance(best, settings().decision))
             == ('quadratic_drag', True)) is named
     assert (block.anything > 100.0) is named
+    drag = next(one for one in block.candidates if one.change.effect == 'quadratic_drag')
+    assert drag.before[0] + drag.shift[0] == pytest.approx(max(shift, 0.0), abs=1.0)
     if not named:
-        assert 'quadratic_drag' not in {one.change.effect for one in block.candidates}
         assert not is_beyond_chance(best, settings().decision)
+
+
+def test_what_ends_at_its_bound_has_changed() -> None:
+    """A resistance of which nothing is left, though a little less would be likelier."""
+    places, rolling = recorded(1), body().names.index('rolling')
+    for name, place in places.items():
+        place[rolling] += -0.016 if name in LATER else 0.05
+    best = said(places).candidates[0]
+    assert best.change.parameters == ('rolling',)
+    assert is_beyond_chance(best, settings().decision)
+    assert best.before[0] + best.shift[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_difference_between_other_recordings_is_no_change() -> None:
