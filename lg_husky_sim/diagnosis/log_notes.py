@@ -10,7 +10,7 @@ from lg_husky_sim.diagnosis.evidence.drives import Drive
 import numpy as np
 
 #: Streams as a reader knows them, by the field of their stamps.
-NAMES = {'wheel_times': 'wheels', 'imu_times': 'imu', 'pose_times': 'pose'}
+NAMES = {'wheel_times': 'wheels', 'imu_times': 'IMU', 'pose_times': 'pose'}
 
 
 def log_notes(drives: Sequence[Drive]) -> tuple[str, ...]:
