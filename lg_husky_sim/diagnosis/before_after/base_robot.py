@@ -9,6 +9,7 @@ from typing import Final
 from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 #: Parameters of the robot, in the order in which the integrator reads them; units and meanings
 #: stand in ``config/before_after.yaml``.
@@ -24,8 +25,10 @@ ROBOT: Final = (
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
                 'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate', 'least_share',
                 'scrub_rate', 'pull_speed')
-#: Columns of what is simulated: base_link's velocity, wheels, specific force at the centre.
-OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'accel_y')
+#: Columns of what is simulated: base_link's velocity, wheel rates, specific force at the centre,
+#: and what they have come to since the start: base_link's place, the angles of the wheels.
+OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'accel_y',
+                  'x', 'y', 'heading', 'angle_left', 'angle_right')
 
 
 @jit
@@ -49,7 +52,7 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     given : bool
     start : numpy.ndarray, shape (5,)
         Forward and lateral speed, yaw rate, wheel rates.
-    out : numpy.ndarray, shape (n + 1, 7)
+    out : numpy.ndarray, shape (n + 1, 12)
         Filled with `OUTPUTS`.
     """
     speed_gain, turn_width = p[4], p[5]
@@ -97,8 +100,8 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
     out[0, 2] = r
     out[0, 3] = w[0]
     out[0, 4] = w[1]
-    out[0, 5] = 0.0
-    out[0, 6] = 0.0
+    for i in range(5, 12):
+        out[0, i] = 0.0
     for k in range(command.shape[0]):
         slow_v += follow * (command[k, 0] - slow_v)
         slow_w += follow * (command[k, 1] - slow_w)
@@ -224,3 +227,50 @@ def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
         out[k + 1, 2] = r
         out[k + 1, 3] = w[0]
         out[k + 1, 4] = w[1]
+        # Trapezoids, along the heading in the middle of the step.
+        middle = out[k, 9] + 0.25 * step * (out[k, 2] + out[k + 1, 2])
+        cos, sin = np.cos(middle), np.sin(middle)
+        ahead = 0.5 * step * (out[k, 0] + out[k + 1, 0])
+        aside = 0.5 * step * (out[k, 1] + out[k + 1, 1])
+        out[k + 1, 7] = out[k, 7] + cos * ahead - sin * aside
+        out[k + 1, 8] = out[k, 8] + sin * ahead + cos * aside
+        out[k + 1, 9] = out[k, 9] + 0.5 * step * (out[k, 2] + out[k + 1, 2])
+        for s in range(2):
+            out[k + 1, 10 + s] = out[k, 10 + s] + 0.5 * step * (out[k, 3 + s] + out[k + 1, 3 + s])
+
+
+@jit
+def mean_in_bins(rows: FloatArray, start: float, step: float, times: FloatArray,
+                 edges: NDArray[np.intp], later: float, out: FloatArray) -> None:
+    """
+    Read rows at the stamps of samples, and average these in bins.
+
+    Parameters
+    ----------
+    rows : numpy.ndarray, shape (n_rows, k)
+        Evenly spaced in time; between two it is linear.
+    start, step : float
+        Time of the first row and spacing [s].
+    times : numpy.ndarray, shape (n_samples,)
+        Stamps [s].
+    edges : numpy.ndarray of int, shape (n_bins,)
+        First sample of each bin.
+    later : float
+        What is added to the stamps [s].
+    out : numpy.ndarray, shape (n_bins, k)
+        Receives the means.
+    """
+    last = rows.shape[0] - 1.000001
+    for b in range(edges.size):
+        first = edges[b]
+        end = edges[b + 1] if b + 1 < edges.size else times.size
+        for c in range(rows.shape[1]):
+            out[b, c] = 0.0
+        for i in range(first, end):
+            place = min(max((times[i] + later - start) / step, 0.0), last)
+            index = int(place)
+            share = place - index
+            for c in range(rows.shape[1]):
+                out[b, c] += rows[index, c] * (1.0 - share) + rows[index + 1, c] * share
+        for c in range(rows.shape[1]):
+            out[b, c] /= end - first

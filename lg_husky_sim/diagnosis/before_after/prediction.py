@@ -6,8 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
-from lg_husky_sim.diagnosis.before_after.base_robot import FIXED, ROBOT, simulate
+from lg_husky_sim.diagnosis.before_after.base_robot import (
+    FIXED,
+    mean_in_bins,
+    OUTPUTS,
+    ROBOT,
+    simulate,
+)
 from lg_husky_sim.diagnosis.before_after.commands import accepted
 from lg_husky_sim.diagnosis.before_after.drives import Bins, Drive
 from lg_husky_sim.diagnosis.before_after.settings import Quantity, Settings
@@ -23,6 +30,10 @@ CHANNELS = {'wheels': ('left', 'right'), 'imu': ('yaw', 'accel_x', 'accel_y'),
 #: Their kinds in ``config/before_after.yaml``.
 KINDS = {'left': 'wheels', 'right': 'wheels', 'yaw': 'yaw', 'accel_x': 'accel',
          'accel_y': 'accel', 'ahead': 'place', 'aside': 'place', 'turn': 'heading'}
+
+
+def _columns(first: str, last: str) -> slice:
+    return slice(OUTPUTS.index(first), OUTPUTS.index(last) + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,14 +64,18 @@ class Base:
     reference: int
     given: bool = False
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Of the parameters."""
         return tuple(q.name for q in self.settings.quantities)
 
+    @cached_property
+    def _logarithmic(self) -> NDArray[np.bool_]:
+        return np.array([q.logarithmic for q in self.settings.quantities])
+
     def values(self, z: FloatArray) -> FloatArray:
         """Return parameters [their units] from the scale of the estimates."""
-        logs = np.array([q.logarithmic for q in self.settings.quantities])
+        logs = self._logarithmic
         return np.where(logs, np.exp(np.where(logs, z, 0.0)), z)
 
     def place(self, name: str, value: float) -> float:
@@ -121,15 +136,6 @@ def base_of(settings: Settings, nominal: Parameters, given: bool = False,
                 tuple({**kind, **voltages} for kind in settings.kinds), against, given)
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """What the integrator gives: velocities, the path of base_link, and the wheels' angles."""
-
-    out: FloatArray
-    path: FloatArray
-    angles: FloatArray
-
-
 def _accepted(base: Base, drive: Drive, x: FloatArray, begin: FloatArray) -> FloatArray:
     value = dict(zip(base.names, x, strict=True))
     wheels = base.fixed[FIXED.index('wheel_radius')] * begin[3:]
@@ -144,12 +150,12 @@ def _accepted(base: Base, drive: Drive, x: FloatArray, begin: FloatArray) -> Flo
     return np.ascontiguousarray(rows.T)
 
 
-def moved(base: Base, drive: Drive, x: FloatArray) -> Motion:
-    """Simulate a drive; `x` in units."""
+def moved(base: Base, drive: Drive, x: FloatArray) -> FloatArray:
+    """Simulate a drive, in columns as `OUTPUTS`; `x` in units."""
     step = base.settings.simulation['step']
     names = base.names
     robot = np.concatenate([x[:len(ROBOT)], base.fixed])
-    out = np.empty((drive.steps + 1, 7))
+    out = np.empty((drive.steps + 1, len(OUTPUTS)))
     begin = np.array(drive.begin)
     mean_rim = (x[names.index('radius_left')] * begin[3]
                 + x[names.index('radius_right')] * begin[4]) / 2.0
@@ -162,31 +168,21 @@ def moved(base: Base, drive: Drive, x: FloatArray) -> Motion:
     else:
         command = _accepted(base, drive, x, begin)
     simulate(robot, step, command, drive.level, wheels, base.given, begin, out)
-    turn = 0.5 * step * (out[1:, 2] + out[:-1, 2])
-    heading = np.concatenate([[0.0], np.cumsum(turn)])
-    middle = heading[:-1] + 0.5 * turn
-    speed = 0.5 * step * (out[1:, :2] + out[:-1, :2])
-    cos, sin = np.cos(middle), np.sin(middle)
-    path = np.zeros((drive.steps + 1, 3))
-    path[1:, 0] = np.cumsum(cos * speed[:, 0] - sin * speed[:, 1])
-    path[1:, 1] = np.cumsum(sin * speed[:, 0] + cos * speed[:, 1])
-    path[:, 2] = heading
-    angles = np.zeros((drive.steps + 1, 2))
-    angles[1:] = np.cumsum(0.5 * step * (out[1:, 3:5] + out[:-1, 3:5]), axis=0)
-    return Motion(out, path, angles)
+    return out
 
 
-def _at(times: FloatArray, start: float, step: float, rows: FloatArray) -> FloatArray:
-    # Linear interpolation on the simulation's even grid.
-    place = np.clip((times - start) / step, 0.0, rows.shape[0] - 1.000001)
-    index = place.astype(np.intp)
-    share = (place - index)[:, None]
-    return np.asarray(rows[index] * (1.0 - share) + rows[index + 1] * share)
+def _read(base: Base, drive: Drive, stream: str, motion: FloatArray, first: str,
+          last: str, later: float) -> FloatArray:
+    # Means in the bins of a stream, of the outputs from the first to the last.
+    bins, rows = drive.bins[stream], motion[:, _columns(first, last)]
+    out = np.empty((bins.edges.size, rows.shape[1]))
+    mean_in_bins(rows, drive.start, base.settings.simulation['step'], bins.times, bins.edges,
+                 later, out)
+    return out
 
 
-def movements(bins: Bins, path: FloatArray) -> FloatArray:
+def movements(path: FloatArray) -> FloatArray:
     """Return the movement between bins in the frame of their mean heading, shape (n - 1, 3)."""
-    del bins
     step = np.diff(path, axis=0)
     heading = 0.5 * (path[1:, 2] + path[:-1, 2])
     cos, sin = np.cos(heading), np.sin(heading)
@@ -194,33 +190,31 @@ def movements(bins: Bins, path: FloatArray) -> FloatArray:
                             cos * step[:, 1] - sin * step[:, 0], step[:, 2]])
 
 
-def predicted(base: Base, drive: Drive, x: FloatArray, motion: Motion) -> dict[str, FloatArray]:
+def predicted(base: Base, drive: Drive, x: FloatArray, motion: FloatArray
+              ) -> dict[str, FloatArray]:
     """Return what each stream's bins should read, by stream."""
-    step = base.settings.simulation['step']
     value = dict(zip(base.names, x, strict=True))
     found = {}
     if not base.given and 'wheels' in drive.bins:
-        bins, half = drive.bins['wheels'], 0.5 * value['wheels_window']
-        middle = bins.times - value['wheels_late']
-        before, after = (_at(middle + side, drive.start, step, motion.angles)
+        half = 0.5 * value['wheels_window']
+        before, after = (_read(base, drive, 'wheels', motion, 'angle_left', 'angle_right',
+                               side - value['wheels_late'])
                          for side in (-half, half))
-        found['wheels'] = bins.mean(after - before) / (2.0 * half)
+        found['wheels'] = (after - before) / (2.0 * half)
     if 'imu' in drive.bins:
-        bins = drive.bins['imu']
-        rows = bins.mean(_at(bins.times - value['imu_late'], drive.start, step,
-                             motion.out[:, [2, 5, 6]]))
-        rate = rows[:, 0]
+        rate, _, _, along, across = _read(base, drive, 'imu', motion, 'yaw', 'accel_y',
+                                          -value['imu_late']).T
         turning = np.gradient(rate, base.settings.bins['yaw'])
         # Of the IMU from the centre of mass, whose acceleration is simulated.
         ahead, aside = value['imu_x'] - value['com_x'], -value['com_y']
         found['imu'] = np.column_stack([
             value['gyro_factor'] * rate + value['gyro_bias'],
-            rows[:, 1] - ahead * rate ** 2 - aside * turning + value['accel_bias_x'],
-            rows[:, 2] + ahead * turning - aside * rate ** 2 + value['accel_bias_y']])
+            along - ahead * rate ** 2 - aside * turning + value['accel_bias_x'],
+            across + ahead * turning - aside * rate ** 2 + value['accel_bias_y']])
     if 'pose' in drive.bins:
         bins = drive.bins['pose']
-        path = bins.mean(_at(bins.times - value['pose_late'], drive.start, step, motion.path))
-        found['pose'] = movements(bins, path)
+        found['pose'] = movements(_read(base, drive, 'pose', motion, 'x', 'heading',
+                                        -value['pose_late']))
         if drive.gyro.size:
             found['pose'][:, 2] = _turn_by_gyro(drive, bins, value)
     return found
@@ -241,7 +235,7 @@ def measured(base: Base, drive: Drive) -> dict[str, FloatArray]:
     found = {name: bins.values for name, bins in drive.bins.items()
              if name != 'pose' and not (base.given and name == 'wheels')}
     if 'pose' in drive.bins:
-        found['pose'] = movements(drive.bins['pose'], drive.bins['pose'].values)
+        found['pose'] = movements(drive.bins['pose'].values)
     return found
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from lg_husky_sim.diagnosis.before_after import diagnose_change, prediction
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
-from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT, simulate
+from lg_husky_sim.diagnosis.before_after.base_robot import OUTPUTS, ROBOT, simulate
 from lg_husky_sim.diagnosis.before_after.commands import accepted
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
 from lg_husky_sim.diagnosis.before_after.conclusion import findings
@@ -21,7 +21,7 @@ from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, Cha
 from lg_husky_sim.diagnosis.before_after.drives import Drive, drives
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
-from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of, Motion
+from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of
 from lg_husky_sim.diagnosis.before_after.report import change_report
 from lg_husky_sim.diagnosis.before_after.selection import select
 from lg_husky_sim.diagnosis.before_after.settings import settings
@@ -72,7 +72,7 @@ def driven(name: str, changes: Mapping[str, float], seed: int,
         accepted(times, np.ascontiguousarray(column), delay, values[f'limit_{axis}'],
                  values[f'slew_{axis}'], 0.0, 0.0, STEP, row)
     held = np.ascontiguousarray(held.T)
-    out, heading = np.empty((count + 1, 7)), np.zeros(count + 1)
+    out, heading = np.empty((count + 1, len(OUTPUTS))), np.zeros(count + 1)
     robot = np.concatenate([[values[n] for n in ROBOT], base.fixed])
     # A slope needs the heading, which turns as without one.
     for _ in range(2):
@@ -376,7 +376,8 @@ def test_a_simulation_that_breaks_down_is_no_place_to_go(monkeypatch: pytest.Mon
     free = np.arange(base.start.size) == mass
     usual = prediction.predicted
 
-    def broken(base: Base, drive: Drive, x: FloatArray, motion: Motion) -> dict[str, FloatArray]:
+    def broken(base: Base, drive: Drive, x: FloatArray, motion: FloatArray
+               ) -> dict[str, FloatArray]:
         found = usual(base, drive, x, motion)
         return found if x[mass] == middle else {n: rows * np.inf for n, rows in found.items()}
     middle = base.values(base.start)[mass]
