@@ -15,7 +15,7 @@ PACKAGE = ROOT / 'lg_husky_sim'
 MAX_LINES = 400
 
 BASE = {'blas', 'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'parallel', 'resources',
-        'settings', 'signals', 'yaml_files'}
+        'settings', 'signals', 'threads', 'yaml_files'}
 MODEL = {'linear_graph', 'husky', 'simulation'}
 DATA = MODEL | {'recording', 'comparison', 'reporting'}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -27,6 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'yaml_files': {'errors'},
     'settings': {'errors', 'resources', 'yaml_files'},
     'blas': set(),
+    'threads': {'blas'},
     'jit': {'errors', 'extras'},
     'parallel': {'errors', 'extras'},
     'manoeuvres': {'errors', 'signals', 'resources', 'yaml_files'},

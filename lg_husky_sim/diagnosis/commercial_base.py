@@ -11,7 +11,7 @@ it to the same ones.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.before_after.drives import all_drives
@@ -56,7 +56,7 @@ class CommercialBase:
 
 def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
                     nominal: ModelFile, late: Mapping[str, float], about: str,
-                    pool: ThreadPoolExecutor) -> CommercialBase | None:
+                    pool: Executor) -> CommercialBase | None:
     """
     Fit a commercial base.
 
@@ -72,7 +72,7 @@ def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
         Numbers of the sensors that are known, by their names in ``config/before_after.yaml``.
     about : str
         Of the model that is returned.
-    pool : ThreadPoolExecutor
+    pool : Executor
 
     Returns
     -------

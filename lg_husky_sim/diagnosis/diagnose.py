@@ -5,10 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 
-from lg_husky_sim.blas import one_thread
 from lg_husky_sim.diagnosis.conclusion import (
     answer,
     estimates,
@@ -49,6 +47,7 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
 from lg_husky_sim.reporting.words import quantity_with_unit
+from lg_husky_sim.threads import threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +109,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     related = relations(parts)
     seen, different = faults(related), differences(related, nominal.parameters)
     numbers = nominal.parameters.replacing({k: v for d in different for k, v in d.numbers.items()})
-    with one_thread(), ThreadPoolExecutor(max(jobs, 1)) as pool:
+    with threads(jobs) as pool:
         start = beginning(nominal.structure, base_unknowns(numbers, drives), numbers, Reading())
         start, there = begun_with(start, certain(seen))
         progress('noise', 0.02)

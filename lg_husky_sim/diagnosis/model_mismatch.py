@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass
 import math
 
@@ -55,7 +55,7 @@ def unsearched(evidence: Evidence, start: Point) -> Search:
 
 def model_mismatch(found: Sequence[Difference], search: Search, plain_out: Mapping[str, float],
                    recordings: Sequence[Recording], parts: Sequence[Segment], nominal: ModelFile,
-                   faults: Sequence[Fault], pool: ThreadPoolExecutor) -> ModelMismatch:
+                   faults: Sequence[Fault], pool: Executor) -> ModelMismatch:
     """
     Say what differs, with a commercial base tried as one hypothesis.
 
@@ -72,7 +72,7 @@ def model_mismatch(found: Sequence[Difference], search: Search, plain_out: Mappi
         With what of the robot is known already.
     faults : sequence of Fault
         Of the sensors that the nominal model has in it.
-    pool : ThreadPoolExecutor
+    pool : Executor
 
     Returns
     -------

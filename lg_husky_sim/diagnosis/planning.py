@@ -11,7 +11,6 @@ the sensors' noise, is what a recording of that drive would say in favour of the
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 import math
 
@@ -32,6 +31,7 @@ from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Segment
+from lg_husky_sim.threads import Threads
 import numpy as np
 
 
@@ -241,7 +241,7 @@ def imitated(truth: Rival, other: Rival, manoeuvre: Manoeuvre) -> tuple[float, s
     noise = Noise({name: setting(f'planned_{name}') for name in LEVELS})
     base = base_unknowns(other.parameters, [drive])
     best = None
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         for start in other.starts:
             own = effect_unknowns(other.structure.effects[-1], start)
             entries = entries_of(other.structure.effects[-1], start)

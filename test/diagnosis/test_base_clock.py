@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
 
 from lg_husky_sim.comparison.output import simulate_commands
@@ -18,6 +17,7 @@ from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, start_of, tick_unknowns
 from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.selection import search
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.diagnosis.selection.ticks import ticks_are_likelier
 from lg_husky_sim.husky.model import compile_model
@@ -25,6 +25,7 @@ from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import TimeSeries
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -53,9 +54,9 @@ def made(steps: Sequence[tuple[float, float, float]]) -> Made:
 
 
 @pytest.fixture
-def pool() -> Iterator[Executor]:
+def pool() -> Iterator[Threads]:
     """Return one thread."""
-    with ThreadPoolExecutor(1) as threads:
+    with Threads(1) as threads:
         yield threads
 
 
@@ -67,7 +68,8 @@ def test_commands_wait_for_the_next_tick_and_the_last_one_counts() -> None:
     np.testing.assert_array_equal(held.values[:, 0], [3.0, 4.0])
 
 
-def test_the_period_of_a_base_is_found_from_two_drives(made: Made, pool: Executor) -> None:
+def test_the_period_of_a_base_is_found_from_two_drives(
+        made: Made, pool: Threads, monkeypatch: pytest.MonkeyPatch) -> None:
     recordings = [made('one', PERIOD, 1), made('two', PERIOD, 2)]
     drives, model = drives_of(recordings), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
@@ -94,7 +96,11 @@ def test_the_period_of_a_base_is_found_from_two_drives(made: Made, pool: Executo
     mass = next(k for k, u in enumerate(start.unknowns) if u.name == 'mass')
     places[mass] += 8.0 * start.unknowns[mass].deviation
     distorted = ticked[0].fit(ticked[1].point.at(places), rounds=0)
-    assert not ticks_are_likelier(plain, (ticked[0], distorted), found)
+    known = search.Recalibrated(evidence, plain[1], search.Logged(plain[1]), *plain)
+    for base, accepted in ((ticked[1], True), (distorted, False)):
+        other = replace(known, base=base)
+        monkeypatch.setattr(search, 'recalibrated', lambda *_, other=other: other)
+        assert (search.at_ticks(known, start, lambda *_: None) is other) is accepted
     quiet = evidence_of(drives, ['one', 'two'], start, replace(guess, values={
         **guess.values, 'command_jitter': 1e-4}), pool)
     assert ticking(quiet, quiet.fit(start, rounds=1)) is None

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.evidence.drives import Drive, drive_of, drives_of
@@ -20,6 +19,7 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording, segments
 from lg_husky_sim.signals import FloatArray, TimeSeries
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -51,7 +51,7 @@ def fitted(recording: Recording) -> tuple[Evidence, Fit]:
     drives, model = drives_of([recording]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         return calibrated(evidence_of(drives, [recording.name], start, first_guess(drives),
                                       pool), start)
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import cast
 
@@ -24,6 +23,7 @@ from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -44,7 +44,7 @@ def limited(record: Callable[..., Recording], steps: Sequence[tuple[float, float
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
     numbers = {'limit_forward': BEYOND, 'limit_yaw': YAW}
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
         yield evidence, evidence.fit(Hypothesis(LIMITS, (numbers,)).point(start, numbers))
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.conclusion import estimates
@@ -30,6 +29,7 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import TimeSeries
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
@@ -43,7 +43,7 @@ def test_a_fit_finds_the_numbers_and_its_intervals_cover(drive: Callable[..., Re
     drives, model = drives_of([drive('ahead', 'nothing', 1)]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence, fit = calibrated(
             evidence_of(drives, ['ahead'], start, first_guess(drives), pool), start, 1)
         found = {e.name: e for e in estimates(fit, list(ROBOT), model.parameters)}
@@ -80,7 +80,7 @@ def test_an_effect_gets_the_form_that_does_best(
                       model.parameters, Reading())
     pool = [h for h in hypotheses(model.structure)
             if h.effect.id in ('wheel_radius_mismatch', 'rolling_resistance', 'yaw_pull')]
-    with ThreadPoolExecutor(1) as threads:
+    with Threads(1) as threads:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), threads)
         evidence, base = calibrated(evidence, start, 1)
         best = forward_step(evidence, base, pool, start).tried[0]
@@ -97,7 +97,7 @@ def test_derivatives_are_those_of_one_number_after_the_other(
                       model.parameters, Reading())
     assert {name for row in APART for name in row} - {'imu_window'} <= {
         u.name for u in start.unknowns}
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
         predicted = evidence.predict(start)
         which = list(range(len(start.unknowns)))[::-1]
@@ -130,7 +130,7 @@ def test_an_effect_that_is_a_delay_takes_all_of_it(
         **recording.streams, stream: replace(logged, times=logged.times + later)})])
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
         evidence, fit = calibrated(evidence, start, 1)
         evidence = Evidence(drives, evidence.names, Noise({
@@ -170,7 +170,7 @@ def test_only_the_sum_of_what_commands_and_readings_are_late_counts(
                       model.parameters, Reading())
     names = [u.name for u in start.unknowns]
     readings = [names.index(name) for name in APART[0]]
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
         evidence, fit = calibrated(evidence, start, 1)
         column = evidence.derivatives(start, evidence.predict(start), [
@@ -276,7 +276,7 @@ def test_commands_may_act_later_in_one_recording_than_in_another(
     drives, model = drives_of([first, early]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['first', 'second'], start, first_guess(drives), pool)
         _, fit = calibrated(evidence, start, 1)
     lags = [fit.point.log.get(one.own_lag) for one in drives]

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.conclusion import answer, needed_evidence, unknown_finding
@@ -27,6 +26,7 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -39,7 +39,7 @@ def fitted(drive: Callable[..., Recording]) -> Iterator[tuple[Evidence, Fit]]:
     drives, model = drives_of([drive('ahead', 'nothing', 1)]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
         yield evidence, evidence.fit(start)
 

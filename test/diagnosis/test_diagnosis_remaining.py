@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 import math
 
 from lg_husky_sim.diagnosis.conclusion import answer, remaining
@@ -26,6 +25,7 @@ from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -74,7 +74,7 @@ def test_a_disturbance_that_lasts_is_no_unknown_effort_and_a_law_is_one(
     drives = drives_of([record('ahead', plant, steps, 6)])
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence, fit = calibrated(
             evidence_of(drives, ['ahead'], start, first_guess(drives), pool), start, 2)
         search = Search(fit, fit, evidence, (Round(evidence, fit, (), False, 1.0),), ())
@@ -91,7 +91,7 @@ def test_a_search_without_slow_disturbances_stays_as_it_is(
     drives, model = drives_of([drive('ahead', 'nothing', 1, share=0.5)]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
         fit = evidence.fit(start, rounds=1)
         search = Search(fit, fit, evidence, (), ())

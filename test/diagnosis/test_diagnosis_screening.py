@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.diagnose import diagnose
@@ -24,6 +23,7 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import FloatArray, TimeSeries
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -42,7 +42,7 @@ def base(record: Callable[..., Recording], steps: Sequence[tuple[float, float, f
     drives = drives_of([record('ahead', plant, steps, 3)])
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
         yield evidence, evidence.fit(start, rounds=3)
 

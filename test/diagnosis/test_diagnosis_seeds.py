@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.conclusion import explained_by
@@ -32,13 +31,14 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.recording import Recording
+from lg_husky_sim.threads import Threads
 import pytest
 
 Recorded = Callable[..., Recording]
 Steps = Sequence[tuple[float, float, float]]
 
 
-def _begun(recording: Recording, pool: ThreadPoolExecutor) -> tuple[Evidence, Point]:
+def _begun(recording: Recording, pool: Threads) -> tuple[Evidence, Point]:
     drives, model = drives_of([recording]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
@@ -46,13 +46,13 @@ def _begun(recording: Recording, pool: ThreadPoolExecutor) -> tuple[Evidence, Po
 
 
 @pytest.fixture
-def threads() -> Iterator[ThreadPoolExecutor]:
+def threads() -> Iterator[Threads]:
     """Return one thread."""
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         yield pool
 
 
-def _seeded(recording: Recording, pool: ThreadPoolExecutor
+def _seeded(recording: Recording, pool: Threads
             ) -> tuple[Fit, list[Tried]]:
     first, start = _begun(recording, pool)
     _, base = calibrated(first, start, 1)
@@ -66,7 +66,7 @@ def _with_loop(sizes: dict[str, float]) -> Plant:
 
 
 def test_a_speed_loop_is_a_seed_where_the_numbers_of_the_robot_took_its_place(
-        record: Recorded, steps: Steps, threads: ThreadPoolExecutor) -> None:
+        record: Recorded, steps: Steps, threads: Threads) -> None:
     plant = _with_loop({'loop_lag': 0.3, 'loop_gain': 1.0, 'loop_integral': 10.0})
     base, seeds = _seeded(record('loop', plant, steps, 1), threads)
     assert max(abs(base.point.prior_residuals)) > 5.0
@@ -76,7 +76,7 @@ def test_a_speed_loop_is_a_seed_where_the_numbers_of_the_robot_took_its_place(
 
 
 def test_smoothed_commands_are_named_and_not_a_loop_without_gains(
-        record: Recorded, steps: Steps, threads: ThreadPoolExecutor) -> None:
+        record: Recorded, steps: Steps, threads: Threads) -> None:
     """A heavy wheel follows like them: the search begins far from that."""
     model, lag = load_model(), Effect('command_slew', shape='lag')
     plant = compile_model(model.structure.with_effect(lag)).at(
@@ -88,14 +88,14 @@ def test_smoothed_commands_are_named_and_not_a_loop_without_gains(
 
 
 def test_a_robot_within_its_tolerances_has_no_seeds(
-        record: Recorded, steps: Steps, threads: ThreadPoolExecutor) -> None:
+        record: Recorded, steps: Steps, threads: Threads) -> None:
     model = load_model()
     plant = compile_model(model.structure).at(model.parameters)
     assert _seeded(record('clean', plant, steps, 1), threads)[1] == []
 
 
 def test_each_early_effect_is_read_anew(
-        record: Recorded, steps: Steps, threads: ThreadPoolExecutor) -> None:
+        record: Recorded, steps: Steps, threads: Threads) -> None:
     plant = _with_loop({'loop_lag': 0.45, 'loop_gain': 2.0, 'loop_integral': 10.0})
     first, start = _begun(record('loop', plant, steps, 1), threads)
     rough = first.fit(start, rounds=1)
@@ -133,7 +133,7 @@ def test_a_reading_that_came_with_a_seed_goes_with_it(
         return [Tried(latency, fit, 100.0, first.count)]
 
     monkeypatch.setattr(searching, 'seeds_of', misled)
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         first, start = _begun(record('clean', plant, steps[:6], 1), pool)
         found = search(first, start, lambda *_: None)
     assert found.found == ()

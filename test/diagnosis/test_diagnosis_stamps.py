@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 import re
 
@@ -20,6 +19,7 @@ from lg_husky_sim.diagnosis.log_notes import log_notes
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import FloatArray, TimeSeries
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -46,7 +46,7 @@ def test_stamps_that_tell_no_even_series_stay(stamps: FloatArray) -> None:
     assert evened(stamps) is stamps
 
 
-def evidence_with(recording: Recording, pool: ThreadPoolExecutor) -> tuple[Evidence, Evidence]:
+def evidence_with(recording: Recording, pool: Threads) -> tuple[Evidence, Evidence]:
     """Return the evidence of a recording at nominal numbers, with logged and likeliest stamps."""
     drives, model = drives_of([recording]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
@@ -70,7 +70,7 @@ def test_the_likelihood_says_whether_stamps_or_readings_are_uneven(
     moved = np.clip(every + off, wheels.times[0], wheels.times[-1])
     sampled = TimeSeries(moved, np.column_stack([
         np.interp(moved, wheels.times, column) for column in wheels.values.T]), wheels.names)
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         for series, is_even in ((stamped, True), (sampled, False)):
             logged, best = evidence_with(replace(recording, streams={
                 **recording.streams, 'wheels': series}), pool)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
@@ -18,6 +17,7 @@ from lg_husky_sim.diagnosis.selection import onsets
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -32,7 +32,7 @@ def test_whitening_a_switched_change_is_whitening_a_gated_simulation(
                       model.parameters, Reading())
     onset = Onset(OnsetKind.TIME, drives[0].start + 8.0, 'ahead')
     hypothesis = next(h for h in hypotheses(model.structure) if h.effect.id == name)
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
         whitener, own = evidence.whiteners[0], drives[0]
         base, plain = evidence.motions(start, True)[0], evidence.predict(start)[0]

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.evidence.deviation import slow_model
@@ -29,6 +28,7 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -45,7 +45,7 @@ def setup(drive: Callable[..., Recording]) -> Iterator[tuple[Evidence, Point]]:
     drives, model = drives_of([drive('ahead', 'nothing', 1)]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         yield evidence_of(drives, ['ahead'], start, TRUE, pool), start
 
 

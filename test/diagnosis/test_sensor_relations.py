@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -32,6 +31,7 @@ from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording, segments
 from lg_husky_sim.signals import FloatArray, TimeSeries
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -110,7 +110,7 @@ def test_what_all_streams_are_late_does_not_go_into_the_one_at_fault(clean: Reco
             places[names.index(name)] = seconds
         point = start.at(places)
         return evidence.cost(evidence.residuals(evidence.predict(point)), point)
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         evidence = evidence_of(drives, ['clean'], start, first_guess(drives), pool)
         others = {'delay_wheels': 0.15, 'delay_pose': 0.15}
         # The same readings: the gyro is early against the others, or late as the base is.

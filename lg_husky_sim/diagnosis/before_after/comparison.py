@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import combinations
 import math
@@ -138,7 +138,7 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
 
 
 def refitted(fits: RecordingFits, later: Collection[str], adopted: Sequence[Change],
-             pool: ThreadPoolExecutor) -> RecordingFits:
+             pool: Executor) -> RecordingFits:
     """
     Return the later recordings fitted once more, with what a nominal robot has not.
 
@@ -153,7 +153,7 @@ def refitted(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chan
     adopted : sequence of Change
         What differs; its parameters are wide open, the others as wide as recordings differ.
         A limit may be anywhere that a change brings it to.
-    pool : ThreadPoolExecutor
+    pool : Executor
 
     Returns
     -------

@@ -11,7 +11,6 @@ from lg_husky_sim.diagnosis.before_after.comparison import Block, compare, refit
 from lg_husky_sim.diagnosis.before_after.conclusion import findings, mismatches, not_told_apart
 from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.drives import all_drives, Drive
-from lg_husky_sim.diagnosis.before_after.fitting import threads
 from lg_husky_sim.diagnosis.before_after.lags import lags_of
 from lg_husky_sim.diagnosis.before_after.prediction import base_of
 from lg_husky_sim.diagnosis.before_after.recording_fits import (
@@ -29,6 +28,7 @@ from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
 from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.threads import threads
 import numpy as np
 
 #: Told what is being done and how far it is (0 to 1).

@@ -4,13 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from lg_husky_sim.blas import one_thread
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.prediction import Base, jacobian, residual
 from lg_husky_sim.diagnosis.before_after.whitening import Noise
@@ -28,13 +25,6 @@ class Mapper(Protocol):
     def __call__(self, function: Callable[[Task], Outcome], tasks: Iterable[Task], /
                  ) -> Iterable[Outcome]:
         """Return what the function makes of each."""
-
-
-@contextmanager
-def threads(jobs: int) -> Iterator[ThreadPoolExecutor]:
-    """Give threads: the integrator runs without the interpreter's lock."""
-    with one_thread(), ThreadPoolExecutor(max(jobs, 1)) as pool:
-        yield pool
 
 
 @dataclass(frozen=True, eq=False)

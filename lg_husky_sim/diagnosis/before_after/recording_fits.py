@@ -11,7 +11,7 @@ by.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.before_after.drives import Drive
@@ -63,7 +63,7 @@ class RecordingFits:
     quadratics: tuple[Quadratic, ...]
     drives: tuple[Drive, ...]
 
-    def again(self, expected: Mapping[str, Prior], pool: ThreadPoolExecutor) -> RecordingFits:
+    def again(self, expected: Mapping[str, Prior], pool: Executor) -> RecordingFits:
         """
         Return this with some recordings fitted once more.
 
@@ -71,7 +71,7 @@ class RecordingFits:
         ----------
         expected : mapping of str to Prior
             By recording, what is expected of it; its fit begins where it was, and there.
-        pool : ThreadPoolExecutor
+        pool : Executor
 
         Returns
         -------
@@ -99,7 +99,7 @@ class RecordingFits:
 
 
 def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: FloatArray,
-                   pool: ThreadPoolExecutor, share: Share) -> RecordingFits:
+                   pool: Executor, share: Share) -> RecordingFits:
     """
     Fit the base to each recording.
 
@@ -118,7 +118,7 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
         By how much the streams of each recording are late, on the scale of the estimates.
     begin : numpy.ndarray, shape (n,)
         Where the fits begin.
-    pool : ThreadPoolExecutor
+    pool : Executor
     share : callable
         Told how far it is (0 to 1).
 
@@ -158,7 +158,7 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
 
 
 def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequence[Drive]],
-           lags: Places, begin: FloatArray, pool: ThreadPoolExecutor, share: Share
+           lags: Places, begin: FloatArray, pool: Executor, share: Share
            ) -> tuple[Places, Noise, Prior]:
     # Each recording by itself, its parameters as far from the mean of all as a change is wide; and
     # the prior of the kind of robot that they are of.
@@ -299,7 +299,7 @@ def _renewed(base: Base, groups: Mapping[str, Sequence[Drive]], places: Places) 
 
 
 def _quadratics(base: Base, groups: Mapping[str, Sequence[Drive]], noise: Noise, prior: Prior,
-                places: Places, pool: ThreadPoolExecutor) -> list[Quadratic]:
+                places: Places, pool: Executor) -> list[Quadratic]:
     return joined(list(pool.map(
         lambda drive: quadratic(base, drive, noise, places[drive.recording], prior),
         [d for ds in groups.values() for d in ds])))

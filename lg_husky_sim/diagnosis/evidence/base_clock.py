@@ -213,18 +213,20 @@ def steps_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Steps |
 def _promising(steps: Sequence[Steps]) -> FloatArray:
     # Rates at which the spectra of delays and slopes stand out, strongest first [Hz].
     longest = max(float(np.ptp(one.stamps)) for one in steps)
-    rates = np.arange(1.0 / setting('clock_longest'), 1.0 / setting('clock_shortest'),
-                      0.2 / longest)
+    # Of stamps on a grid that is fine for the shortest period; lines as near as drives tell apart.
+    grid = setting('clock_shortest') / setting('clock_grid')
+    count = int(np.ceil(5.0 * longest / grid))
+    first = int(np.ceil(grid * count / setting('clock_longest')))
+    last = int(grid * count / setting('clock_shortest'))
+    rates = np.arange(first, last) / (grid * count)
     found = []
     for seen in ([one.weights * (one.delays - one.late) for one in steps],
                  [one.slope - np.mean(one.slope) for one in steps]):
         power = np.zeros(rates.size)
         for one, values in zip(steps, seen, strict=True):
-            for begin in range(0, rates.size, 2048):
-                part = slice(begin, begin + 2048)
-                waves = np.exp(-2j * np.pi * np.outer(rates[part], one.stamps - one.stamps[0]))
-                power[part] += np.abs(waves @ values) ** 2 / max(
-                    float(np.sum(values ** 2)), 1e-300)
+            at = np.rint((one.stamps - one.stamps[0]) / grid).astype(np.intp)
+            lines = np.fft.rfft(np.bincount(at, values), count)[first:last]
+            power += np.abs(lines) ** 2 / max(float(np.sum(values ** 2)), 1e-300)
         peak = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
         found.append(rates[peak[np.argsort(-power[peak], kind='stable')][
             :int(setting('clock_rates'))]])

@@ -15,7 +15,6 @@ lowers the cost by, in nats: a likelihood ratio of exp(gain).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
@@ -37,6 +36,7 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.threads import Threads
 import numpy as np
 
 
@@ -80,12 +80,12 @@ class Evidence:
     noise : Noise
     whiteners : sequence of Whitener
         One a drive.
-    pool : concurrent.futures.Executor
-        Threads for independent simulations.
+    pool : Threads
+        For independent simulations.
     """
 
     def __init__(self, drives: Sequence[Drive], names: Sequence[str], noise: Noise,
-                 whiteners: Sequence[Whitener], pool: Executor) -> None:
+                 whiteners: Sequence[Whitener], pool: Threads) -> None:
         self.drives = tuple(drives)
         self.names = tuple(names)
         self.noise = noise
@@ -101,17 +101,19 @@ class Evidence:
 
     def motions(self, point: Point, probe: bool = False) -> list[Motion]:
         """Return the simulated motion of each drive."""
-        return [simulate(plant, drive, point.log, probe)
-                for plant, drive in zip(self.plants(point.plant), self.drives, strict=True)]
+        return list(self.pool.map(lambda plant, drive: simulate(plant, drive, point.log, probe),
+                                  self.plants(point.plant), self.drives))
 
     def predict(self, point: Point) -> tuple[FloatArray, ...]:
         """Return the simulated readings of each drive."""
-        return tuple(observe(motion, drive, point.log) for motion, drive in zip(
-            self.motions(point), self.drives, strict=True))
+        return tuple(self.pool.map(
+            lambda plant, drive: observe(simulate(plant, drive, point.log), drive, point.log),
+            self.plants(point.plant), self.drives))
 
     def whiten(self, columns: Sequence[FloatArray]) -> FloatArray:
         """Whiten residuals or differences, given drive by drive."""
-        return np.concatenate([w.apply(c) for w, c in zip(self.whiteners, columns, strict=True)])
+        return np.concatenate(list(self.pool.map(
+            lambda whitener, own: whitener.apply(own), self.whiteners, columns)))
 
     def residuals(self, predicted: Sequence[FloatArray]) -> FloatArray:
         """Return the innovations of simulated readings."""
@@ -287,6 +289,6 @@ class Evidence:
 
 
 def evidence_of(drives: Sequence[Drive], names: Sequence[str], point: Point, noise: Noise,
-                pool: Executor) -> Evidence:
+                pool: Threads) -> Evidence:
     """Return the evidence of drives under a first guess of the noise."""
     return Evidence(drives, names, noise, (), pool).about(point)

@@ -53,7 +53,6 @@ def best_reading(evidence: Evidence, fit: Fit) -> Fit:
 
 def _better(evidence: Evidence, fit: Fit, window: str,
             options_of: Callable[[Evidence, Reading], Sequence[Reading]]) -> Fit:
-    # One after the other: a fit has work for all threads itself.
     options = options_of(evidence, fit.point.reading)
     if not options:
         return fit
@@ -62,7 +61,8 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
     # All by as many steps: what the same reading gains by them is not due to another one.
     rounds = int(setting('reading_rounds'))
-    tried = [evidence.fit(points[place], fit.slopes, rounds=rounds) for place in order]
+    tried = evidence.pool.map(
+        lambda place: evidence.fit(points[place], fit.slopes, rounds=rounds), order)
     best = min(tried, key=lambda one: one.cost, default=fit)
     same = min(fit, evidence.fit(fit.point, rounds=rounds), key=lambda one: one.cost)
     if best.cost > same.cost - setting('reading_gain'):

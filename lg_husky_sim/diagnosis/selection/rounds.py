@@ -324,22 +324,20 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     -------
     list of Tried
     """
-    rough = []
     least = max(setting('least_look'), setting('look_part') * max(
         (one.gain for one in looks if one.gain < math.inf), default=0.0))
-    for one in looks:
-        if one.gain < least:
-            continue
+
+    def tried(one: Look) -> Tried | None:
         numbers = [one.numbers, *(other.numbers for other in further
                                   if other.hypothesis.label == one.hypothesis.label
                                   and other is not one)]
         if len(points) > 1:
             # What a look promises from one point says little at another.
             numbers += one.hypothesis.starts
-        result = attempt(evidence, base, one.hypothesis, list(itertools.product(points, numbers)),
-                         whole=False)
-        if result is not None:
-            rough.append(result)
+        return attempt(evidence, base, one.hypothesis, list(itertools.product(points, numbers)),
+                       whole=False)
+    results = evidence.pool.map(tried, [one for one in looks if one.gain >= least])
+    rough = [one for one in results if one is not None]
     rough.sort(key=lambda t: -t.score)
     # An onset is for those whose onset gains more than it costs.
     always = {t.hypothesis.effect: t.score for t in rough if t.hypothesis.onset is None}
@@ -347,15 +345,15 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
         replace(t.hypothesis.effect, late=False), -math.inf)]
     if not whole:
         return rough
-    found = []
-    for result in rough[:int(setting('fitted_whole'))]:
-        own = result
+
+    def whole_of(own: Tried) -> Tried:
         if own.hypothesis.onset is not None:
             own = refined(evidence, base, own, attempt, numbers_of)
         places = own.fit.point.places[:base.point.places.size]
         again = attempt(evidence, base, own.hypothesis, [(base.point.at(places), numbers_of(own))])
-        found.append(again if again is not None and again.gain >= own.gain else own)
-    found += rough[len(found):]
+        return again if again is not None and again.gain >= own.gain else own
+    few = int(setting('fitted_whole'))
+    found = [*evidence.pool.map(whole_of, rough[:few]), *rough[few:]]
     found.sort(key=lambda t: -t.score)
     once: dict[tuple[object, object], Tried] = {}
     for kept in found:

@@ -160,8 +160,12 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tri
 
 def _best_start(evidence: Evidence, base: Fit, begins: Sequence[tuple[
         Hypothesis, FloatArray, Numbers]]) -> tuple[Evidence, Hypothesis, Point] | None:
-    fits = [attempt(evidence, base, hypothesis, [(base.point.at(places), start) for start in (
-        numbers, *hypothesis.starts)], whole=False) for hypothesis, places, numbers in begins]
+    def fitted_from(begin: tuple[Hypothesis, FloatArray, Numbers]) -> Tried | None:
+        hypothesis, places, numbers = begin
+        there = base.point.at(places)
+        return attempt(evidence, base, hypothesis, [
+            (there, start) for start in (numbers, *hypothesis.starts)], whole=False)
+    fits = evidence.pool.map(fitted_from, begins)
     tried = [one for one in fits if one is not None]
     if not tried:
         return None
@@ -207,8 +211,22 @@ def _read_like(evidence: Evidence, base: Fit, seed: Tried) -> tuple[Fit, Tried]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Recalibrated:
-    """The model as it is, with the noise and the reading of the log."""
+class Recalibrated:
+    """
+    The model as it is, with the noise and the reading of the log.
+
+    Parameters
+    ----------
+    first : Evidence
+        Under a first guess of the noise.
+    rough : Fit
+        Under it, after one step.
+    logged : Logged
+    evidence : Evidence
+        With the last noise.
+    base : Fit
+        Under that.
+    """
 
     first: Evidence
     rough: Fit
@@ -217,7 +235,8 @@ class _Recalibrated:
     base: Fit
 
 
-def _recalibrated(evidence: Evidence, start: Point) -> _Recalibrated:
+def recalibrated(evidence: Evidence, start: Point) -> Recalibrated:
+    """Fit the model as it is, from where it should be."""
     # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
     rough = evidence.fit(start, rounds=1)
     stamped, point = likeliest_stamps(evidence, rough)
@@ -225,23 +244,27 @@ def _recalibrated(evidence: Evidence, start: Point) -> _Recalibrated:
         evidence, rough = stamped, stamped.fit(point, rounds=1)
     logged = _as_logged(evidence, rough)
     start = _nominal(logged.fit.point)
-    return _Recalibrated(evidence, rough, logged, *calibrated(evidence.about(start), start))
+    return Recalibrated(evidence, rough, logged, *calibrated(evidence.about(start), start))
 
 
-def _at_ticks(known: _Recalibrated, start: Point, progress: Progress) -> _Recalibrated | None:
-    # The same of a base that applies commands at its own ticks, if that is why they jitter.
+def at_ticks(known: Recalibrated, start: Point, progress: Progress) -> Recalibrated | None:
+    """Return the same of a base that applies commands at its own ticks, if that is likelier."""
     drives = ticking(known.evidence, known.base)
     if drives is None:
         return None
     progress('update rate of the base', 0.08)
-    first = known.first
     own = tick_unknowns(drives)
-    start = replace(start, unknowns=(*start.unknowns, *own),
-                    places=np.append(start.places, start_of(own)))
-    other = _recalibrated(evidence_of(drives, first.names, start, first.noise, first.pool), start)
-    likelier = ticks_are_likelier((known.evidence, known.base), (other.evidence, other.base),
-                                  drives)
-    return other if likelier else None
+
+    def ticked(evidence: Evidence, point: Point) -> tuple[Evidence, Point]:
+        wider = replace(point, unknowns=(*point.unknowns, *own),
+                        places=np.append(point.places, start_of(own)))
+        return evidence_of(drives, evidence.names, wider, evidence.noise, evidence.pool), wider
+    near = calibrated(*ticked(known.evidence, known.base.point), 1)
+    if not ticks_are_likelier((known.evidence, known.base), near, drives):
+        return None
+    other = recalibrated(*ticked(known.first, start))
+    # What is distorted with them, too, lacks something else, which they may be a part of.
+    return None if is_distorted(other.base) else other
 
 
 def _nominal(point: Point) -> Point:
@@ -281,8 +304,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     Search
     """
     progress('recalibration', 0.05)
-    known = _recalibrated(evidence, start)
-    ticked = _at_ticks(known, start, progress)
+    known = recalibrated(evidence, start)
+    ticked = at_ticks(known, start, progress)
     if ticked is not None:
         known = ticked
     evidence, base = known.evidence, known.base

@@ -6,8 +6,7 @@ Whether a base applies commands at ticks of its own, once the likeliest ticks ar
 Ticks explain why some commands act later than others, not that all are late, which slow ticks of
 the right phase can mimic where a drive has few steps of the commands. So both have what all
 commands are late as free as the slowest ticks would make it, and ticks must be likelier by more
-than the best of so many would be by chance. Where the robot is distorted with them, too, something
-else is missing, which they may have absorbed a part of.
+than the best of so many would be by chance.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ import math
 from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
-from lg_husky_sim.diagnosis.selection.rounds import calibrated, is_distorted
+from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.diagnosis.settings import setting
 
 
@@ -35,8 +34,6 @@ def ticks_are_likelier(plain: tuple[Evidence, Fit], ticked: tuple[Evidence, Fit]
     drives : sequence of Drive
         With the ticks that are likeliest.
     """
-    if is_distorted(ticked[1]):
-        return False
     before, after = (evidence.surprise(fit) for evidence, fit in (
         calibrated(evidence, any_lateness(fit.point), 1) for evidence, fit in (plain, ticked)))
     return before - after > gain_by_chance(drives)
