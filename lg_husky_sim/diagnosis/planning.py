@@ -19,8 +19,8 @@ from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drive_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import NAMES as LEVELS
 from lg_husky_sim.diagnosis.evidence.noise import Noise
-from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, effect_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.diagnosis.localisation import NAMES

@@ -13,8 +13,8 @@ from lg_husky_sim.diagnosis.evidence.base_clock import at_ticks, steps_of, ticki
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, Noise
-from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, start_of, tick_unknowns
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.selection import search

@@ -10,8 +10,8 @@ from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.evidence.drives import Drive, drive_of, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
-from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.log_notes import log_notes
 from lg_husky_sim.diagnosis.selection.rounds import calibrated

@@ -12,14 +12,9 @@ from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, Noise, sensor_variance
-from lg_husky_sim.diagnosis.evidence.observation import (
-    APART,
-    observe,
-    Reading,
-    simulate,
-    WheelReading,
-)
+from lg_husky_sim.diagnosis.evidence.observation import APART, observe, simulate
 from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses, Hypothesis
 from lg_husky_sim.diagnosis.selection.rounds import attempt, calibrated, forward_step, with_jitter

@@ -11,8 +11,9 @@ from lg_husky_sim.diagnosis.conclusion import answer, needed_evidence, unknown_f
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
-from lg_husky_sim.diagnosis.evidence.observation import probe_times, Reading
+from lg_husky_sim.diagnosis.evidence.observation import probe_times
 from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.evidence.whitener import respond
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST, responses

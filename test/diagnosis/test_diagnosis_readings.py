@@ -9,14 +9,20 @@ from dataclasses import replace
 import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drives_of
-from lg_husky_sim.diagnosis.evidence.observation import observe, Reading, simulate, WheelReading
+from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
+from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.observation import observe, simulate
+from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, loosened, Unknown
+from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.recording.wheels import rates_from_angles
 from lg_husky_sim.signals import TimeSeries
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -54,6 +60,39 @@ def test_a_low_pass_follows_the_rate_of_a_wheel(driven: Drive, lag: float) -> No
     assert moving > 1.0
     error = left[early] - solved.sol(driven.wheel_times[early])[0]
     assert np.max(np.abs(error)) < 0.1 * 0.01 / model.parameters['wheel_radius']
+
+
+def test_a_low_pass_follows_the_yaw_rate_and_is_found(drive: Callable[..., Recording]) -> None:
+    """As the low pass of a gyro does: an integrator of high order, with little noise."""
+    lag = 0.027
+    clean, model = drive('ahead', 'nothing', 1), load_model()
+    own, plant = drives_of([clean])[0], compile_model(model.structure).at(model.parameters)
+    fine = np.arange(own.start, own.end, 0.0005)
+    dense = replace(own, imu_times=fine, wheel_times=fine[:0], pose_times=fine[:0],
+                    measured=np.zeros(fine.size), times=fine,
+                    channels=np.full(fine.size, int(Channel.YAW_RATE)))
+    rate = observe(simulate(plant, dense, Reading()), dense, Reading())
+    solved = solve_ivp(lambda t, y: (np.interp(t, fine, rate) - y) / lag,
+                       (float(fine[0]), float(fine[-1])), [rate[0]], method='RK45',
+                       max_step=0.002, rtol=1e-8, atol=1e-10, dense_output=True)
+    behind = solved.sol(own.imu_times)[0]
+    filtered = Reading(imu=math.inf, values={'imu_window': lag})
+    seen = observe(simulate(plant, own, filtered), own, filtered)[own.slice_of(Channel.YAW_RATE)]
+    assert np.max(np.abs(seen - rate.mean())) > 0.3
+    assert np.max(np.abs(seen - behind)[own.imu_times < fine[-1]]) < 1e-3
+    imu = clean.streams['imu']
+    values = np.array(imu.values)
+    values[:, imu.names.index('yaw_rate')] = solved.sol(imu.times)[0] + (
+        0.001 * np.random.default_rng(6).standard_normal(imu.times.size))
+    drives = drives_of([replace(clean, streams={
+        **clean.streams, 'imu': TimeSeries(imu.times, values, imu.names)})])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, [clean.name], start, first_guess(drives), pool)
+        read = best_reading(evidence, evidence.fit(start)).point.log
+    assert read.imu == math.inf
+    assert read.get('imu_window') == pytest.approx(lag, rel=0.1)
 
 
 def _delay(driven: Drive, name: str) -> Unknown:

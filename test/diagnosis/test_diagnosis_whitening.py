@@ -17,8 +17,8 @@ from lg_husky_sim.diagnosis.evidence.noise import (
     Whitener,
     whitener_of,
 )
-from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.point import beginning, Point
+from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.evidence.whitener import MODEL
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of

@@ -22,7 +22,8 @@ from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Clock, Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
-from lg_husky_sim.diagnosis.evidence.observation import observe, Reading, simulate
+from lg_husky_sim.diagnosis.evidence.observation import observe, simulate
+from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, TimeSeries

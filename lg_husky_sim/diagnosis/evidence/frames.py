@@ -7,13 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
-from lg_husky_sim.diagnosis.evidence.observation import (
-    command_lag,
-    Motion,
-    probe_times,
-    Reading,
-    wheel_lag,
-)
+from lg_husky_sim.diagnosis.evidence.observation import command_lag, Motion, probe_times
+from lg_husky_sim.diagnosis.evidence.reading import Reading, wheel_lag
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray

@@ -11,65 +11,19 @@ differences of angles over the time in which an encoder counts, or followed by a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-import enum
+from dataclasses import dataclass, replace
 from hashlib import blake2b
+import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.low_pass import low_passed
+from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant, SensorModel
 from lg_husky_sim.signals import BodyTwist, FloatArray, TimeSeries
 from lg_husky_sim.simulation.events import COLUMNS, Events, Propagator
 from lg_husky_sim.simulation.starting import commanded_until
 import numpy as np
-
-
-class WheelReading(enum.Enum):
-    """How the rate of a wheel is made, and where in its window the stamp lies."""
-
-    WINDOW_END = 'mean over a window that ends at the stamp'
-    WINDOW_MIDDLE = 'mean over a window around the stamp'
-    WINDOW_START = 'mean over a window that begins at the stamp'
-    FILTERED = 'low-passed'
-
-
-@dataclass(frozen=True)
-class Reading:
-    """
-    How a log was made: what is estimated with the rest.
-
-    Parameters
-    ----------
-    wheels : WheelReading
-    imu : float or None
-        Where in the window of its mean a yaw rate is stamped: 0 at the end, 1 at the begin; None
-        for a rate of the moment.
-    values : mapping of str to float
-        ``wheel_window`` [s] (length of the window, or time constant of the low pass),
-        ``imu_window`` [s] (length of the window of a yaw rate; its period if not given),
-        ``delay_wheels``, ``delay_imu``, ``delay_pose`` [s] (how late stamps are),
-        ``command_delay`` [s] (how late the base applies commands), :attr:`Drive.late` and
-        :attr:`Drive.own_lag` [s] (how much later than that in one drive, in one recording),
-        ``gyro_offset`` [rad/s],
-        ``gyro_gain`` [1] (relative), ``pose_turn`` [rad] (heading of the pose's frame against the
-        direction of travel), ``pose_lever`` [m] (how far ahead of the middle it is).
-    """
-
-    wheels: WheelReading = WheelReading.WINDOW_END
-    imu: float | None = None
-    values: Mapping[str, float] = field(default_factory=dict)
-
-    def get(self, name: str) -> float:
-        """Return a value; what is not there is zero, but for the window of the encoders."""
-        if name == 'wheel_window':
-            return self.values.get(name, setting('wheel_window'))
-        return self.values.get(name, 0.0)
-
-    def replacing(self, values: Mapping[str, float]) -> Reading:
-        """Return this with other values."""
-        return replace(self, values={**self.values, **values})
-
 
 #: Numbers of a reading that move readings of different sensors, each only its own: one simulation
 #: has the derivatives by all of them. The last two rows do not even need another one.
@@ -161,15 +115,15 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
         begins = wheels[:0]
     elif reading.wheels is WheelReading.FILTERED:
         begins = wheels[:0]
-        first = min(drive.start, float(np.min(wheels))) if wheels.size else drive.start
-        count = int(np.ceil((drive.end - first) / setting('filter_step'))) + 2
-        ends = np.asarray(first + setting('filter_step') * np.arange(count), dtype=np.float64)
+        ends = _even(drive, wheels)
     else:
         ends = wheels + {WheelReading.WINDOW_END: 0.0, WheelReading.WINDOW_MIDDLE: 0.5,
                          WheelReading.WINDOW_START: 1.0}[reading.wheels] * window
         begins = ends - window
     imu_begins = imu[:0]
-    if reading.imu is not None and imu.size > 3:
+    if reading.imu == math.inf and imu.size > 3:
+        imu = _even(drive, imu)
+    elif reading.imu is not None and imu.size > 3:
         window = reading.values.get('imu_window', float(np.median(np.diff(drive.imu_times))))
         imu = imu + reading.imu * window
         imu_begins = imu - window
@@ -192,6 +146,14 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
     events = Events(commands, times, start=drive.start)
     spans = times[parts['wheels']] - times[parts['begins']] if begins.size else begins
     return Wanted(events, parts, spans)
+
+
+def _even(drive: Drive, stamps: FloatArray) -> FloatArray:
+    # Times that a low pass follows.
+    step = setting('filter_step')
+    first = min(drive.start, float(np.min(stamps))) if stamps.size else drive.start
+    count = int(np.ceil((drive.end - first) / step)) + 2
+    return np.asarray(first + step * np.arange(count), dtype=np.float64)
 
 
 def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) -> Motion:
@@ -218,8 +180,9 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
               sensors.delay_pose + reading.get('delay_pose'))
     # A low pass follows the motion wherever its time constant.
     window = reading.get('wheel_window') if reading.wheels is not WheelReading.FILTERED else 0.0
-    key = (reading.wheels, reading.imu, window,
-           reading.values.get('imu_window'), command_lag(drive, reading), delays, probe)
+    imu_window = reading.values.get('imu_window') if reading.imu != math.inf else 0.0
+    key = (reading.wheels, reading.imu, window, imu_window, command_lag(drive, reading), delays,
+           probe)
     wanted = drive.remembered(key, lambda: _wanted(drive, reading, delays, probe))
     rows = drive.rows((key, _signature(plant)), lambda: _driven(
         plant, drive, wanted.events, command_lag(drive, reading)))
@@ -275,17 +238,25 @@ def _signature(plant: Plant) -> bytes:
 
 def _rate(motion: Motion, drive: Drive, side: str, reading: Reading, late: float) -> FloatArray:
     if reading.wheels is WheelReading.FILTERED:
-        followed = low_passed(motion.column(f'wheel_{side}', 'wheels'), setting('filter_step'),
-                              max(reading.get('wheel_window'), 1e-6))
-        found: FloatArray = np.interp(
-            drive.wheel_times - late, motion.times[motion.wanted.parts['wheels']], followed)
-        return found
+        return _followed(motion, f'wheel_{side}', 'wheels', drive.wheel_times - late,
+                         reading.get('wheel_window'))
     turned = motion.column(f'angle_{side}', 'wheels') - motion.column(f'angle_{side}', 'begins')
     return _mean_rate(turned, motion.wanted.spans, motion.column(f'wheel_{side}', 'wheels'))
 
 
-def _yaw_rate(motion: Motion) -> FloatArray:
-    # Of the moment, or the mean over a window.
+def _followed(motion: Motion, name: str, part: str, stamps: FloatArray, lag: float
+              ) -> FloatArray:
+    # Behind a low pass.
+    followed = low_passed(motion.column(name, part), setting('filter_step'), max(lag, 1e-6))
+    found: FloatArray = np.interp(stamps, motion.times[motion.wanted.parts[part]], followed)
+    return found
+
+
+def _yaw_rate(motion: Motion, drive: Drive, reading: Reading, late: float) -> FloatArray:
+    # Of the moment, or the mean over a window, or behind a low pass.
+    if reading.imu == math.inf and drive.imu_times.size > 3:
+        return _followed(motion, 'yaw_rate', 'imu', drive.imu_times - late,
+                         reading.get('imu_window'))
     parts = motion.wanted.parts
     if parts['imu_begins'].start == parts['imu_begins'].stop:
         return motion.column('yaw_rate', 'imu')
@@ -298,20 +269,6 @@ def _mean_rate(turned: FloatArray, span: FloatArray, rate: FloatArray) -> FloatA
     # That of the moment where all of the window is before the drive.
     found: FloatArray = np.where(span > 1e-6, turned / np.maximum(span, 1e-6), rate)
     return found
-
-
-def wheel_lag(reading: Reading) -> float:
-    """Return how long before its stamp a wheel rate was true, on the mean [s]."""
-    window = reading.get('wheel_window')
-    share = {WheelReading.WINDOW_END: 0.5, WheelReading.WINDOW_MIDDLE: 0.0,
-             WheelReading.WINDOW_START: -0.5, WheelReading.FILTERED: 1.0}[reading.wheels]
-    return reading.get('delay_wheels') + share * window
-
-
-def imu_lag(reading: Reading, period: float) -> float:
-    """Return how long before its stamp a yaw rate was true, on the mean [s]."""
-    window = 0.0 if reading.imu is None else reading.values.get('imu_window', period)
-    return reading.get('delay_imu') + (0.5 - (reading.imu or 0.0)) * window
 
 
 def observe(motion: Motion, drive: Drive, reading: Reading) -> FloatArray:
@@ -361,7 +318,8 @@ def _observed(motion: Motion, drive: Drive, reading: Reading, sensors: SensorMod
                     sensors.delay_wheels + reading.get('delay_wheels'))
     if drive.imu_times.size:
         out[drive.slice_of(Channel.YAW_RATE)] = (
-            sensors.gyro_factor * (1.0 + reading.get('gyro_gain')) * _yaw_rate(motion)
+            sensors.gyro_factor * (1.0 + reading.get('gyro_gain')) * _yaw_rate(
+                motion, drive, reading, sensors.delay_imu + reading.get('delay_imu'))
             + sensors.gyro_bias + reading.get('gyro_offset'))
     if drive.pose_times.size:
         out[drive.slice_of(Channel.HEADING)] = motion.column('heading', 'pose')

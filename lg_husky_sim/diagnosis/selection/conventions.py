@@ -6,10 +6,6 @@ How a log was made, found by the likelihood of the recalibrated model.
 Wheel rates may be of the moment, means over a window with the stamp at its end, middle or begin,
 or low-passed; so may a yaw rate. An offset of the stamps that comes with the smoothing of its
 window is a convention, one without is late.
-
-A first-order low pass of time constant tau delays by tau and smooths with a variance of tau^2. To
-second order in tau this is the mean over a window of sqrt(12) tau that begins
-``(1/2 + 1/sqrt(12)) sqrt(12) tau`` before the stamp.
 """
 
 from __future__ import annotations
@@ -19,13 +15,8 @@ from dataclasses import replace
 import math
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
-from lg_husky_sim.diagnosis.evidence.observation import (
-    imu_lag,
-    Reading,
-    wheel_lag,
-    WheelReading,
-)
 from lg_husky_sim.diagnosis.evidence.point import Point
+from lg_husky_sim.diagnosis.evidence.reading import imu_lag, Reading, wheel_lag, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import window_unknown
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
@@ -136,19 +127,15 @@ def _imu_options(evidence: Evidence, now: Reading) -> list[Reading]:
     if not times:
         return []
     period = round(_period(times), 4)
+    # A low pass of a time constant delays by it and smooths with its square as variance, as a mean
+    # over the root of twelve of them.
     return [replace(now, imu=place).replacing({'imu_window': window})
-            for place in (0.0, 0.5, 1.0, _low_pass())
-            for window in (0.01, 0.04, period) if window <= _longest(place, period)]
-
-
-def _low_pass() -> float:
-    # Where a mean over sqrt(12) time constants has to be, against the stamp, to be as late and as
-    # long as a low pass.
-    return 0.5 - 1.0 / math.sqrt(12.0)
+            for place, share in ((0.0, 1.0), (0.5, 1.0), (1.0, 1.0), (math.inf, 12.0 ** -0.5))
+            for window in (share * 0.01, share * 0.04, share * period)
+            if window <= _longest(place, period)]
 
 
 def _longest(place: float | None, period: float) -> float:
     # A mean ends within its period or so; a low pass may last longer.
-    if place == _low_pass():
-        return math.sqrt(12.0) * setting('slowest_gyro')
-    return max(setting('longest_imu_window'), period)
+    return setting('slowest_gyro') if place == math.inf else max(
+        setting('longest_imu_window'), period)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.evidence.base_clock import ticking
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
-from lg_husky_sim.diagnosis.evidence.observation import Reading
 from lg_husky_sim.diagnosis.evidence.point import Point
+from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
 from lg_husky_sim.diagnosis.evidence.unknowns import start_of, tick_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, Numbers
