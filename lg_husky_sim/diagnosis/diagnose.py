@@ -28,7 +28,7 @@ from lg_husky_sim.diagnosis.held_out import errors, held_out_errors
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts
 from lg_husky_sim.diagnosis.localisation import mismatches, Missing, missing_efforts
-from lg_husky_sim.diagnosis.log_notes import log_notes
+from lg_husky_sim.diagnosis.log_notes import log_notes, reading_notes
 from lg_husky_sim.diagnosis.model_mismatch import model_mismatch, ModelMismatch, unsearched
 from lg_husky_sim.diagnosis.result import Diagnosis, Rivalry, Verdict
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
@@ -233,6 +233,7 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
         notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(moved)
                      + '; check that the model is one of this robot')
     notes += log_notes(found.evidence.drives)
+    notes += reading_notes(found.evidence.drives, found.final.point.log)
     values = found.evidence.noise.values
     notes.append(f'estimated disturbances (standard deviation): force {values["force"]:.2g} '
                  f'N, yaw moment {values["moment"]:.2g} N·m, torque on the wheels of each side '

@@ -5,8 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Drive
+from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
+from lg_husky_sim.diagnosis.settings import setting
 import numpy as np
 
 #: Streams as a reader knows them, by the field of their stamps.
@@ -42,6 +45,36 @@ def log_notes(drives: Sequence[Drive]) -> tuple[str, ...]:
         notes.append(f'{count} of {sum(len(d.logged) for d in drives)} commands seem to have '
                      'reached the base late or not at all, or to be missing in the log: the '
                      'model was driven by what the base seems to have got')
+    return tuple(notes)
+
+
+def reading_notes(drives: Sequence[Drive], reading: Reading) -> tuple[str, ...]:
+    """
+    Return how the rates of wheels and yaw seem to have been made, in sentences.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+    reading : Reading
+        As estimated; of rates of the moment nothing is said.
+
+    Returns
+    -------
+    tuple of str
+    """
+    notes, window = [], reading.get('wheel_window')
+    rated = any(d.wheel_times.size and not d.counted for d in drives)
+    if rated and window > setting('shortest_window'):
+        kind = {WheelReading.WINDOW_END: 'means over {} ms before their stamps',
+                WheelReading.WINDOW_MIDDLE: 'means over {} ms around their stamps',
+                WheelReading.WINDOW_START: 'means over {} ms after their stamps',
+                WheelReading.FILTERED: 'behind a first-order low pass of {} ms'}[reading.wheels]
+        notes.append('wheel rates seem to be ' + kind.format(f'{1e3 * window:.2g}'))
+    if reading.imu is not None and any(d.imu_times.size for d in drives):
+        length = f'{1e3 * reading.get("imu_window"):.2g} ms'
+        notes.append('yaw rates of the IMU seem to be ' + (
+            f'behind a first-order low pass of {length}' if reading.imu == math.inf
+            else f'means over {length}'))
     return tuple(notes)
 
 

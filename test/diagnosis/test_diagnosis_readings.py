@@ -15,6 +15,7 @@ from lg_husky_sim.diagnosis.evidence.observation import observe, simulate
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, loosened, Unknown
+from lg_husky_sim.diagnosis.log_notes import reading_notes
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model import compile_model
@@ -93,6 +94,24 @@ def test_a_low_pass_follows_the_yaw_rate_and_is_found(drive: Callable[..., Recor
         read = best_reading(evidence, evidence.fit(start)).point.log
     assert read.imu == math.inf
     assert read.get('imu_window') == pytest.approx(lag, rel=0.1)
+    assert reading_notes(drives, read)[-1].startswith(
+        'yaw rates of the IMU seem to be behind a first-order low pass of 2')
+
+
+@pytest.mark.parametrize(('wheels', 'window', 'imu', 'said'), [
+    (WheelReading.WINDOW_MIDDLE, 0.05, None,
+     ('wheel rates seem to be means over 50 ms around their stamps',)),
+    (WheelReading.FILTERED, 0.08, 0.0, (
+        'wheel rates seem to be behind a first-order low pass of 80 ms',
+        'yaw rates of the IMU seem to be means over 10 ms')),
+    (WheelReading.WINDOW_END, 0.0005, None, ())])
+def test_what_a_rate_means_is_said(driven: Drive, wheels: WheelReading, window: float,
+                                   imu: float | None, said: tuple[str, ...]) -> None:
+    reading = Reading(wheels, imu, {'wheel_window': window, 'imu_window': 0.01})
+    assert reading_notes([driven], reading) == said
+    # Counts are no rates.
+    counted = replace(driven, counted=True, imu_times=driven.imu_times[:0])
+    assert reading_notes([counted], reading) == ()
 
 
 def _delay(driven: Drive, name: str) -> Unknown:
