@@ -147,10 +147,8 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
 
         def drawn(name: str, about: Prior = about, places: Places = places) -> FloatArray:
             here = replace(about, mean=about.mean + lags[name])
-            ends = [place - lags[other] + lags[name] for other, place in places.items()
-                    if other != name]
-            return _raced(base, groups[name], here, noise, [
-                [places[name]], [here.mean], *([end] for end in ends)], numbers['enough']).z
+            return _raced(base, groups[name], here, noise, [[places[name]], [here.mean]],
+                          numbers['enough']).z
         places = dict(zip(groups, pool.map(drawn, groups), strict=True))
     found = _quadratics(base, groups, noise, every, places, pool)
     share(1.0)
