@@ -24,7 +24,8 @@ def stretches_of(segment: Segment) -> tuple[Segment, ...]:
     return tuple(windows(segment, longest)) if segment.duration > 1.5 * longest else (segment,)
 
 
-def errors(plant: Plant, segments: Sequence[Segment]) -> dict[str, float]:
+def errors(plant: Plant, segments: Sequence[Segment], names: Sequence[str] = ()
+           ) -> dict[str, float]:
     """
     Return root mean square errors of a plant that is driven with the recorded commands.
 
@@ -32,6 +33,9 @@ def errors(plant: Plant, segments: Sequence[Segment]) -> dict[str, float]:
     ----------
     plant : Plant
     segments : sequence of Segment
+    names : sequence of str, optional
+        Of all recordings in the order in which they were made, whichever of them are here: an
+        effect that begins in one of them is absent in those before it.
 
     Returns
     -------
@@ -41,9 +45,10 @@ def errors(plant: Plant, segments: Sequence[Segment]) -> dict[str, float]:
     """
     parts: list[Mapping[str, SquareSum]] = []
     bounds: list[tuple[float, float]] = []
+    earlier = () if plant.onset is None else plant.onset.before(names)
     for segment in segments:
         for stretch in stretches_of(segment):
-            prediction = replay(plant, stretch)
+            prediction = replay(plant.in_recording(stretch.recording, earlier), stretch)
             parts.append(channel_errors(stretch, prediction))
             if 'pose' in stretch.streams:
                 bounds.append(tracking(stretch, prediction).bounds)
@@ -120,5 +125,6 @@ def held_out_errors(found: Search, parts: Sequence[Segment]
     for fit in (found.plain, found.final):
         evidence = evidence_of(drives, found.evidence.names, fit.point, found.evidence.noise,
                                found.evidence.pool)
-        results.append(errors(evidence.fit(fit.point, rounds=3).point.plant, test))
+        results.append(errors(evidence.fit(fit.point, rounds=3).point.plant, test,
+                              found.evidence.names))
     return results[0], results[1]

@@ -117,7 +117,9 @@ def test_a_form_that_stands_for_others_is_offered_first() -> None:
             (later,) = [h for h in own.others if h.effect.shape == other]
             assert later.effect == Effect(name, own.effect.side, other)
             assert {p.name for p in later.free} <= {p.name for p in own.free}
-            assert not later.others
+            assert set(later.starts[0]) == {p.name for p in later.free}
+            assert own.effect in [h.effect for h in later.others]
+            assert own.family == later.family
 
 
 def small(hypothesis: Hypothesis) -> dict[str, float]:

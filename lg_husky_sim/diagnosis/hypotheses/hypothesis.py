@@ -56,10 +56,22 @@ class Hypothesis:
         return tuple(p for p in self.effect.parameters() if not p.fixed)
 
     @property
+    def family(self) -> tuple[str, str, str]:
+        """Id, side, and the form that its own is or is stood for by."""
+        effect = self.effect
+        return effect.id, effect.side, next(
+            (shape for shape, others in effect.kind.stands_for.items() if effect.shape in others),
+            effect.shape)
+
+    @property
     def others(self) -> tuple[Hypothesis, ...]:
-        """This effect in the other forms that its own stands for."""
-        return tuple(replace(self, effect=replace(self.effect, shape=shape))
-                     for shape in self.effect.kind.stands_for.get(self.effect.shape, ()))
+        """The other forms of its family."""
+        found, first = [], self.family[-1]
+        for shape in (first, *self.effect.kind.stands_for.get(first, ())):
+            effect = replace(self.effect, shape=shape)
+            if shape != self.effect.shape:
+                found.append(replace(_of(effect), onset=self.onset))
+        return tuple(found)
 
     def at(self, onset: Onset | None) -> Hypothesis:
         """Return this effect with another onset."""
@@ -153,14 +165,16 @@ def hypotheses(structure: Structure) -> tuple[Hypothesis, ...]:
         later = {shape for others in kind.stands_for.values() for shape in others}
         for side, shape in itertools.product(kind.sides, kind.shapes):
             effect = Effect(name, side, shape)
-            free = [p for p in effect.parameters() if not p.fixed]
-            if taken & {p.name for p in effect.parameters()} or shape in later:
-                continue
-            count = max(len(p.starts) for p in free)
-            starts = tuple({p.name: p.starts[min(i, len(p.starts) - 1)] for p in free}
-                           for i in range(count))
-            found.append(Hypothesis(effect, starts))
+            if not taken & {p.name for p in effect.parameters()} and shape not in later:
+                found.append(_of(effect))
     return tuple(found)
+
+
+def _of(effect: Effect) -> Hypothesis:
+    free = [p for p in effect.parameters() if not p.fixed]
+    return Hypothesis(effect, tuple(
+        {p.name: p.starts[min(i, len(p.starts) - 1)] for p in free}
+        for i in range(max(len(p.starts) for p in free))))
 
 
 def labels(found: Sequence[Hypothesis]) -> list[str]:

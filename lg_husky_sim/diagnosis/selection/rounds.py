@@ -236,7 +236,7 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
 def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:
     # Of the forms that one stands for: numbers more are for those that do not do as well without.
     there = base.point.at(tried.fit.point.places[:base.point.places.size])
-    found = [attempt(evidence, base, other, [(there, numbers_of(tried))])
+    found = [attempt(evidence, base, other, [(there, {**other.starts[0], **numbers_of(tried)})])
              for other in tried.hypothesis.others]
     return max([tried, *(one for one in found if one is not None)], key=lambda t: t.score)
 
@@ -282,7 +282,9 @@ def is_negligible(tried: Tried, jitter: Mapping[str, float]) -> bool:
 
 def _looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
            promising: Sequence[Effect] | None) -> list[Look]:
-    # With an onset: every effect, or those that promise most with and without one.
+    # With an onset: every effect, or those that promise most with and without one. Of the forms
+    # that one stands for, the best.
+    pool = [form for h in pool for form in (h, *h.others)]
     always = [h for h in pool if not h.effect.kind.needs_onset]
     seen = look(evidence, base, always)
     late = list(pool)
@@ -292,7 +294,11 @@ def _looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         late = [h for h in pool if h.effect.id in names or h.effect.kind.needs_onset]
     seen += onset_looks(evidence, base, late, seen)
     penalty = 0.5 * math.log(evidence.count)
-    return sorted(seen, key=lambda one: penalty * one.hypothesis.size - one.gain)
+    seen.sort(key=lambda one: penalty * one.hypothesis.size - one.gain)
+    best: dict[tuple[object, ...], Look] = {}
+    for one in seen:
+        best.setdefault((one.hypothesis.family, one.hypothesis.onset is None), one)
+    return list(best.values())
 
 
 def numbers_of(tried: Tried) -> Numbers:
