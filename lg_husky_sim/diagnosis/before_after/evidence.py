@@ -17,12 +17,14 @@ from scipy.special import log_ndtr
 @dataclass(frozen=True, eq=False)
 class Quadratic:
     """
-    A recording's negative log likelihood near a point, as 0.5 θ'Hθ - h'θ + c.
+    A recording's negative log likelihood near a point p, as 0.5 θ'Hθ - h'θ + c.
 
     Parameters
     ----------
     recording : str
     after : bool
+    place : numpy.ndarray, shape (n,)
+        The point p, where the recording was fitted.
     curvature : numpy.ndarray, shape (n, n)
     slope : numpy.ndarray, shape (n,)
     cost : float
@@ -31,6 +33,7 @@ class Quadratic:
 
     recording: str
     after: bool
+    place: FloatArray
     curvature: FloatArray
     slope: FloatArray
     cost: float = 0.0
@@ -41,14 +44,14 @@ class Quadratic:
 
     def among(self, index: NDArray[np.intp]) -> Quadratic:
         """Return this for some of the parameters; it does not depend on the others."""
-        return replace(self, curvature=self.curvature[np.ix_(index, index)],
-                       slope=self.slope[index])
+        return replace(self, place=self.place[index], slope=self.slope[index],
+                       curvature=self.curvature[np.ix_(index, index)])
 
     def less(self, shift: FloatArray) -> Quadratic:
         """Return this as a function of the parameters less a shift of them."""
         moved = self.curvature @ shift
-        return replace(self, slope=self.slope - moved, cost=self.cost + float(
-            0.5 * shift @ moved - self.slope @ shift))
+        return replace(self, place=self.place - shift, slope=self.slope - moved,
+                       cost=self.cost + float(0.5 * shift @ moved - self.slope @ shift))
 
     def curved(self, k: int, at: float, least: float) -> Quadratic:
         """Return this with so much curvature at least along a parameter, about a value of it."""
@@ -127,6 +130,8 @@ class Evidence:
 
             sd^2 = (weight sd_assumed^2 + sum of E[deviation^2]) / (weight + n_recordings)
 
+        but none is larger than by the places of the recordings alone: see `apart`.
+
         Parameters
         ----------
         weight : float
@@ -140,7 +145,7 @@ class Evidence:
         -------
         Evidence
         """
-        n = self.mean.size
+        n, most = self.mean.size, self.apart(weight, rounds)
         found = replace(self, change_sd=free * self.change_sd)
         for _ in range(rounds):
             at, covariance, _ = found._posterior(np.arange(n))
@@ -156,10 +161,52 @@ class Evidence:
                 deviation = spread @ (sd * one.slope) - move @ at
                 squares += deviation ** 2 + np.diag(spread) + np.einsum(
                     'ij,jk,ik->i', move, covariance, move)
-            found = replace(found, recording_sd=np.sqrt(
+            found = replace(found, recording_sd=np.minimum(most, np.sqrt(
                 (weight * self.recording_sd ** 2 + sd ** 2 * squares)
-                / (weight + len(self.quadratics))))
+                / (weight + len(self.quadratics)))))
         return replace(found, change_sd=self.change_sd)
+
+    def apart(self, weight: float, rounds: int) -> FloatArray:
+        """
+        Return the deviations of each parameter by itself, by how far apart recordings ended.
+
+        Where parameters depend on each other, derivatives that are a little off promise that a
+        recording is far from where it ended, which it is not. With places p of curvature c::
+
+            E[deviation^2] = s^2 ((p - m)^2 + 1 / sum of w) + (1 - s) sd^2
+            w = c / (1 + sd^2 c),  s = sd^2 w,  m = sum of w p / sum of w for each set
+
+        So recordings that say nothing of a parameter leave it as assumed, and those that say much
+        add what they are apart (as a moderated variance does, Smyth 2004).
+
+        Parameters
+        ----------
+        weight : float
+            Recordings that the assumed deviations are worth.
+        rounds : int
+            Of the iteration.
+
+        Returns
+        -------
+        numpy.ndarray, shape (n,)
+        """
+        sets = [[one for one in self.quadratics if one.after == after] for after in (False, True)]
+        known = [(np.array([one.place for one in those]),
+                  np.array([np.maximum(np.diag(one.curvature), 0.0) for one in those]))
+                 for those in sets if those]
+        sd = self.recording_sd
+        for _ in range(rounds):
+            squares = np.zeros(sd.size)
+            for places, curvatures in known:
+                w = curvatures / (1.0 + sd ** 2 * curvatures)
+                total = np.maximum(w.sum(axis=0), np.finfo(np.float64).tiny)
+                share = sd ** 2 * w
+                off = places - (w * places).sum(axis=0) / total
+                squares += (share ** 2 * (off ** 2 + 1.0 / total)
+                            + (1.0 - share) * sd ** 2).sum(axis=0)
+            sd = np.sqrt((weight * self.recording_sd ** 2 + squares)
+                         / (weight + len(self.quadratics)))
+        return sd
 
     def solve(self, changed: NDArray[np.intp]) -> Solution:
         """
@@ -226,7 +273,7 @@ def joined(parts: Sequence[Quadratic]) -> list[Quadratic]:
     for part in parts:
         there = found.get(part.recording)
         found[part.recording] = part if there is None else Quadratic(
-            part.recording, part.after, there.curvature + part.curvature,
+            part.recording, part.after, part.place, there.curvature + part.curvature,
             there.slope + part.slope, there.cost + part.cost)
     return list(found.values())
 

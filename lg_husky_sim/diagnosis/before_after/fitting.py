@@ -11,6 +11,7 @@ from typing import Protocol, TypeVar
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.prediction import Base, jacobian, residual
 from lg_husky_sim.diagnosis.before_after.whitening import Noise
+from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +88,7 @@ def cost_at(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, z: 
 def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, begin: FloatArray,
             steps: int, enough: float, each: Mapper) -> SetFit:
     """
-    Fit by Gauss-Newton with Levenberg's damping.
+    Fit inside bounds by Gauss-Newton with Levenberg's damping.
 
     Derivatives serve for further steps as long as these gain about what they promise.
 
@@ -127,13 +128,14 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
         gram = np.diag(precision) + sum(j.T @ j for j in derivatives)
         begun = cost
         for _attempt in range(8):
-            slope = precision * (z - prior.mean)[free] + sum(
+            slope = -precision * (z - prior.mean)[free] - sum(
                 j.T @ e for j, e in zip(derivatives, errors, strict=True))
-            move = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), slope)
+            move = step_inside(gram + damping * np.diag(np.diag(gram)), slope,
+                               (lower - z)[free], (upper - z)[free])
             near = np.array(z)
-            near[free] -= move
+            near[free] += move
             near = np.clip(near, lower, upper)
-            promised = 0.5 * float(slope @ move)
+            promised = float(slope @ move - 0.5 * move @ gram @ move)
             other = whites(base, drives, noise, near, each)
             reached = _cost(other, prior, near)
             if reached >= cost:

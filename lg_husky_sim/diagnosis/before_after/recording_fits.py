@@ -147,8 +147,13 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
 
         def drawn(name: str, about: Prior = about, places: Places = places) -> FloatArray:
             here = replace(about, mean=about.mean + lags[name])
-            return _raced(base, groups[name], here, noise, [[places[name]], [here.mean]],
-                          numbers['enough']).z
+            own = _raced(base, groups[name], here, noise, [[places[name]], [here.mean]],
+                         numbers['enough'])
+            ends = [[place - lags[other] + lags[name]] for other, place in places.items()
+                    if other != name]
+            other = _raced(base, groups[name], here, noise, ends, numbers['enough'])
+            # Of optima that are as likely, its own.
+            return other.z if own.cost - other.cost > numbers['enough'] else own.z
         places = dict(zip(groups, pool.map(drawn, groups), strict=True))
     found = _quadratics(base, groups, noise, every, places, pool)
     share(1.0)
@@ -246,7 +251,7 @@ def quadratic(base: Base, drive: Drive, noise: Noise, z: FloatArray, prior: Prio
     rows, columns = jacobian(base, drive, z, prior.free)
     e, j = noise.white(rows), noise.white(columns)
     curvature, slope = j.T @ j, j.T @ e
-    return Quadratic(drive.recording, False, curvature, curvature @ z - slope,
+    return Quadratic(drive.recording, False, z, curvature, curvature @ z - slope,
                      0.5 * float(e @ e) - float(z @ slope) + 0.5 * float(z @ curvature @ z))
 
 

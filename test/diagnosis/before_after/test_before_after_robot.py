@@ -19,7 +19,6 @@ from lg_husky_sim.diagnosis.before_after.conclusion import findings
 from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, ChangeCase
 from lg_husky_sim.diagnosis.before_after.drives import Drive, drives
-from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
 from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of
 from lg_husky_sim.diagnosis.before_after.report import change_report
@@ -223,32 +222,6 @@ def test_a_gyro_is_judged_by_the_pose_and_not_by_the_model() -> None:
     assert case.body is not None
     after = dict(zip(case.body.base.names, case.body.base.values(case.body.after), strict=True))
     assert after['gyro_factor'] == pytest.approx(0.93, abs=0.005)
-
-
-def test_what_recordings_differ_by_is_estimated() -> None:
-    """From three recordings a set, around the means of the sets."""
-    rng = np.random.default_rng(2)
-    places = rng.standard_normal(6)
-    places = 0.005 * (places - np.repeat([places[:3].mean(), places[3:].mean()], 3))
-    places[3:] += 0.05
-    precise = np.array([[1e8]])
-    recordings = [Quadratic(f'rec{k}', k > 2, precise, 1e8 * places[k:k + 1]) for k in range(6)]
-    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.001),
-                        np.full(1, 0.1)).estimated(2.0, 30, 30.0)
-    assert evidence.solve(np.array([0])).shift[0] == pytest.approx(0.05, rel=0.3)
-    assert evidence.recording_sd[0] == pytest.approx(
-        np.sqrt((2.0 * 0.001 ** 2 + np.sum((places - np.repeat(
-            [places[:3].mean(), places[3:].mean()], 3)) ** 2)) / 8.0), rel=0.3)
-
-
-def test_a_change_of_forty_times_its_prior_is_no_deviation() -> None:
-    recordings = [Quadratic(f'rec{k}', k > 1, np.array([[1e6]]), np.array([-4e6 * (k > 1)]))
-                  for k in range(4)]
-    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.02), np.full(1, 0.1))
-    found = evidence.estimated(2.0, 30, settings().fit['recording_free'])
-    assert found.recording_sd[0] < 0.021
-    assert found.change_sd[0] == 0.1
-    assert evidence.estimated(2.0, 30, 1.0).recording_sd[0] > 0.5
 
 
 @pytest.mark.parametrize(('how', 'effect'), [

@@ -37,7 +37,7 @@ def said(places: Mapping[str, FloatArray], later: frozenset[str] = LATER) -> Blo
     prior = Prior(base.start, base.sd, free)
     curvature = np.diag([1.0 / (PRECISION * max(q.recording, 1e-4)) ** 2 for q in quantities])
     return compare(RecordingFits(base, prior, first_noise(settings()), base.start, places, tuple(
-        Quadratic(name, False, curvature, curvature @ z, 0.5 * float(z @ curvature @ z))
+        Quadratic(name, False, z, curvature, curvature @ z, 0.5 * float(z @ curvature @ z))
         for name, z in places.items()), ()), later)
 
 

@@ -1,0 +1,68 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""By what recordings of one robot differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
+from lg_husky_sim.diagnosis.before_after.settings import settings
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+import pytest
+
+
+def recording(k: int, place: Sequence[float], curvature: FloatArray, after: bool) -> Quadratic:
+    """Return the likelihood of a recording that is likeliest at a place."""
+    at = np.array(place, dtype=float)
+    return Quadratic(f'rec{k}', after, at, curvature, curvature @ at)
+
+
+def test_what_recordings_differ_by_is_estimated() -> None:
+    """From three recordings a set, around the means of the sets."""
+    rng = np.random.default_rng(2)
+    places = rng.standard_normal(6)
+    places = 0.005 * (places - np.repeat([places[:3].mean(), places[3:].mean()], 3))
+    places[3:] += 0.05
+    precise = np.array([[1e8]])
+    recordings = [recording(k, [places[k]], precise, k > 2) for k in range(6)]
+    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.001),
+                        np.full(1, 0.1)).estimated(2.0, 30, 30.0)
+    assert evidence.solve(np.array([0])).shift[0] == pytest.approx(0.05, rel=0.3)
+    assert evidence.recording_sd[0] == pytest.approx(
+        np.sqrt((2.0 * 0.001 ** 2 + np.sum((places - np.repeat(
+            [places[:3].mean(), places[3:].mean()], 3)) ** 2)) / 6.0), rel=0.1)
+
+
+def test_a_change_of_forty_times_its_prior_is_no_deviation() -> None:
+    recordings = [recording(k, [-4.0 * (k > 1)], np.array([[1e6]]), k > 1) for k in range(4)]
+    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.02), np.full(1, 0.1))
+    found = evidence.estimated(2.0, 30, settings().fit['recording_free'])
+    assert found.recording_sd[0] < 0.021
+    assert found.change_sd[0] == 0.1
+
+
+def test_recordings_that_say_nothing_leave_what_is_assumed() -> None:
+    """A limit that is not reached may end anywhere."""
+    nothing = np.zeros((1, 1))
+    recordings = [recording(k, [float(k)], nothing, k > 2) for k in range(6)]
+    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.02), np.full(1, 0.1))
+    assert evidence.estimated(2.0, 30, 30.0).recording_sd[0] == pytest.approx(0.02)
+
+
+def test_derivatives_that_promise_what_is_not_there_are_no_deviation() -> None:
+    """The fits have ended alike in each set, though their derivatives say they are far apart."""
+    shift, promised = 0.1, 0.3
+    curvature = np.array([[1e6]])
+    recordings = []
+    for k in range(4):
+        one = recording(k, [shift * (k > 1)], curvature, k > 1)
+        recordings.append(replace(one, slope=one.slope + curvature[0] * promised * (-1.0) ** k))
+    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.array([0.003]),
+                        np.array([0.1])).estimated(2.0, 30, 30.0)
+    assert evidence.recording_sd[0] < 0.003
+    solution = evidence.solve(np.array([0]))
+    assert solution.shift[0] == pytest.approx(shift, abs=0.01)
+    assert solution.evidence - evidence.nothing > 10.0
