@@ -4,7 +4,7 @@
 Coefficients of the confidence, from the outcomes of trials.
 
 For each verdict the share right is a logistic function of what informs about it,
-``p = 1 / (1 + exp(-(c0 + c1 x)))``. The coefficients maximise the likelihood of the
+``p = 1 / (1 + exp(-(c0 + c1 x1 + ...)))``. The coefficients maximise the likelihood of the
 outcomes with independent Gaussian priors around zero, and around a stated share right for c0, so
 that few outcomes do not make certainty.
 """
@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 
 #: Verdict to the names of its coefficients in the settings of the diagnosis.
 COEFFICIENTS = {
-    'known': ('name_constant', 'name_share'),
+    'known': ('name_constant', 'name_share', 'name_gain'),
     'nothing_missing': ('nothing_constant', 'nothing_chance'),
     'unknown': ('unknown_constant', 'unknown_share_slope'),
 }
@@ -38,7 +38,10 @@ def _row(verdict: str, features: Json) -> list[float]:
     """Return what multiplies the coefficients of a verdict."""
     if verdict == 'nothing_missing':
         return [1.0, math.log10(max(float(features['chance']), 1e-12))]
-    return [1.0, math.log(max(float(features['share']), 1e-3))]
+    share = math.log(max(float(features['share']), 1e-3))
+    if verdict == 'unknown':
+        return [1.0, share]
+    return [1.0, share, math.log10(max(float(features['gain']), 1.0))]
 
 
 def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
@@ -69,7 +72,7 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
                 row = _row(line['verdict'], line['features'])
             except (KeyError, TypeError, ValueError) as error:
                 raise LgHuskyError(f'case {line["case"]}: the features of its confidence need the '
-                                   f'numbers share and chance: {error}') from error
+                                   f'numbers share, chance and gain: {error}') from error
             rows[line['verdict']].append(row)
             right[line['verdict']].append(mark)
     if not any(right.values()):

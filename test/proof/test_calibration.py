@@ -35,30 +35,37 @@ def lines(count: int) -> list[dict[str, Any]]:
     """Return outcomes that are wrong the oftener the more a smooth effort explains."""
     rng = np.random.default_rng(2)
     shares = rng.uniform(0.02, 1.0, count)
-    return [line(f'c{i}', bool(rng.uniform() > s), margin=0.5, share=s, chance=1e-9)
+    return [line(f'c{i}', bool(rng.uniform() > s), gain=30.0, share=s, chance=1e-9)
             for i, s in enumerate(shares)]
 
 
 def test_a_share_that_informs_gets_weight_and_the_share_right_is_kept() -> None:
     rows = lines(400)
     found = calibrated(rows)
-    constant, share = (found[n][0] for n in ('name_constant', 'name_share'))
+    constant, share, gain = (found[n][0] for n in ('name_constant', 'name_share', 'name_gain'))
     assert share < -0.5
-    stated = [1.0 / (1.0 + np.exp(-(constant + share * np.log(r['features']['share']))))
-              for r in rows]
+    stated = [1.0 / (1.0 + np.exp(-(constant + share * np.log(r['features']['share'])
+                                    + gain * np.log10(30.0)))) for r in rows]
     assert np.mean(stated) == pytest.approx(found['name_share'][2] / 400, abs=0.02)
     assert found['name_share'][1] == 400
     assert found['unknown_constant'][1] == 0
 
 
+def test_names_that_gain_little_are_less_sure_if_they_are_wrong_oftener() -> None:
+    rng = np.random.default_rng(3)
+    rows = [line(f'c{i}', bool(rng.uniform() < g / 4.0), gain=10.0 ** g, share=0.1, chance=1e-9)
+            for i, g in enumerate(rng.uniform(1.0, 4.0, 300))]
+    assert calibrated(rows)['name_gain'][0] > 0.5
+
+
 def test_few_outcomes_do_not_make_certainty() -> None:
-    found = calibrated([line('a', True, margin=1.0, share=0.0, chance=0.0)])
+    found = calibrated([line('a', True, gain=1e4, share=0.0, chance=0.0)])
     assert 1.0 / (1.0 + np.exp(-found['name_constant'][0])) < 0.97
 
 
 @pytest.mark.parametrize(('features', 'named'), [
-    ({'margin': 0.5, 'share': 0.1}, 'case bad'), ({'margin': 0.5, 'share': None, 'chance': 1.0},
-                                                  'case bad'), ({}, 'no outcome')])
+    ({'gain': 9.0, 'share': 0.1}, 'case bad'), ({'gain': 9.0, 'share': None, 'chance': 1.0},
+                                                'case bad'), ({}, 'no outcome')])
 def test_outcomes_without_what_it_needs_are_refused(features: dict[str, Any], named: str) -> None:
     damaged = {**line('bad', True, **features), 'verdict': 'nothing_missing'}
     if features and 'chance' in features:
@@ -83,5 +90,5 @@ def test_command_prints_what_stands_in_the_settings(
 def test_what_is_fitted_is_what_the_diagnosis_uses(verdict: Verdict, value: float) -> None:
     # The trial shares no code with the diagnosis, so that both say what informs.
     assert calibration.COEFFICIENTS[verdict.value] == confidence.COEFFICIENTS[verdict]
-    assert calibration._row(verdict.value, {'share': value, 'chance': value}) == [
-        1.0, confidence.informs(verdict, value, value)]
+    assert calibration._row(verdict.value, {'share': value, 'chance': value, 'gain': value}) == [
+        1.0, *confidence.informs(verdict, confidence.Features(value, 1.0, value, value))]

@@ -3,12 +3,12 @@
 """
 How sure an answer is, by a logistic function of what informs about it.
 
-For each verdict ``p = 1 / (1 + exp(-(c0 + c1 x)))``. Posterior odds carry no information: the form
-of no law is exact, so that they are near 1 for right and wrong names alike. The margin to the next
-name is not used: where it is small, the names are declared not to be told apart. What informs of
-a name, and of ``unknown``, is what a smooth effort still explains as a share of what the name
-explains, ``x = log(share)``; of ``nothing``, how far the largest gain is beyond chance,
-``x = log10(chance)``.
+For each verdict ``p = 1 / (1 + exp(-(c0 + c1 x1 + ...)))``. Posterior odds carry no information:
+the form of no law is exact, so that they are near 1 for right and wrong names alike. The margin to
+the next name is not used: where it is small, the names are declared not to be told apart. What
+informs of a name is what a smooth effort still explains as a share of what the name explains,
+``x1 = log(share)``, and how much that is, ``x2 = log10(gain)``; of ``unknown``, that share; of
+``nothing``, how far the largest gain is beyond chance, ``x1 = log10(chance)``.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ import math
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.settings import setting
 
-#: Verdict to the settings that are its coefficients, c0 and c1.
+#: Verdict to the settings that are its coefficients, c0, c1, ...
 COEFFICIENTS = {
-    Verdict.KNOWN: ('name_constant', 'name_share'),
+    Verdict.KNOWN: ('name_constant', 'name_share', 'name_gain'),
     Verdict.NOTHING_MISSING: ('nothing_constant', 'nothing_chance'),
     Verdict.UNKNOWN: ('unknown_constant', 'unknown_share_slope'),
 }
@@ -51,28 +51,30 @@ class Features:
     chance: float
 
 
-def informs(verdict: Verdict, share: float, chance: float) -> float:
+def informs(verdict: Verdict, features: Features) -> tuple[float, ...]:
     """
-    Return what informs about a verdict, x.
+    Return what informs about a verdict, x1, ...
 
     Parameters
     ----------
     verdict : Verdict
-    share, chance : float
-        As in :class:`Features`.
+    features : Features
 
     Returns
     -------
-    float
-        Bounded: what is below the least share, or chance, is told apart by nobody.
+    tuple of float
+        Bounded: what is below the least share, chance, or gain, is told apart by nobody.
     """
     if verdict is Verdict.NOTHING_MISSING:
-        return math.log10(max(chance, setting('least_chance')))
-    return math.log(max(share, setting('least_told_share')))
+        return (math.log10(max(features.chance, setting('least_chance'))),)
+    share = math.log(max(features.share, setting('least_told_share')))
+    if verdict is Verdict.UNKNOWN:
+        return (share,)
+    return share, math.log10(max(features.gain, setting('least_told_gain')))
 
 
 def confidence(verdict: Verdict, features: Features) -> float:
     """Return how likely a verdict, with its first name, is right."""
-    constant, slope = (setting(name) for name in COEFFICIENTS[verdict])
-    return 1.0 / (1.0 + math.exp(-constant - slope * informs(
-        verdict, features.share, features.chance)))
+    constant, *slopes = (setting(name) for name in COEFFICIENTS[verdict])
+    return 1.0 / (1.0 + math.exp(-constant - sum(
+        slope * x for slope, x in zip(slopes, informs(verdict, features), strict=True))))
