@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -21,6 +21,7 @@ from lg_husky_sim.diagnosis.evidence.unknowns import (
     loosened,
     model_unknown,
 )
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.diagnosis.output import headline, summary_text
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
@@ -28,6 +29,7 @@ from lg_husky_sim.diagnosis.sensors.relations import by_names, relations
 from lg_husky_sim.diagnosis.sensors.repair import begun_with, certain, fault_findings
 from lg_husky_sim.diagnosis.sensors.robot import differences, impossible
 from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording, segments
 from lg_husky_sim.signals import FloatArray, TimeSeries
@@ -178,6 +180,22 @@ def test_a_deflated_wheel_is_still_this_robot_and_one_twice_as_large_is_not(
     assert not differs(0.9)
     assert not differs(1.1)
     assert differs(2.0)
+    assert differs(0.5)
+
+
+def test_tyres_that_slip_by_a_resistance_are_no_smaller_wheels(
+        record: Make, steps: Sequence[tuple[float, float, float]]) -> None:
+    """The robot lags behind its wheels by the same at every speed."""
+    model, effect = load_model(), Effect('rolling_resistance')
+    radius = model.parameters['wheel_radius']
+    plant = compile_model(model.structure.with_effect(effect)).at(model.parameters.replacing({
+        'wheel_damping': 1.3}).with_entries(*entries_of(effect, {'rolling_force': 60.0})))
+    related = relations(segments(record('slips', plant, steps, 3)))
+    speed = by_names(related)['speed', 'wheels', 'pose']
+    assert speed.factor.value < 0.6 * radius
+    assert speed.rolling is not None
+    assert speed.rolling.value == pytest.approx(radius, rel=0.1)
+    assert differences(related, model.parameters) == ()
 
 
 @pytest.mark.parametrize(('name', 'value', 'impossible_'), [

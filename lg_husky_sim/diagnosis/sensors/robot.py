@@ -70,8 +70,10 @@ def differences(found: Sequence[Relation], parameters: Parameters) -> tuple[Diff
             'far). The wheels are off the ground, or the pose is not that of this robot', abs(off),
             on_ground=False),)
     tolerance = setting('other_radius' if rolls.value > radius else 'slipping')
-    if speed.explained < setting('least_explained') or rolls.value <= 0.0 or not (
-            rolls.is_off(radius, tolerance * radius)):
+    # Tyres may slip by a resistance: what it takes is the same at every speed.
+    rolling = rolls if speed.rolling is None or rolls.value > radius else speed.rolling
+    if speed.explained < setting('least_explained') or rolls.value <= 0.0 or not all(
+            one.is_off(radius, tolerance * radius) for one in (rolls, rolling)):
         return ()
     return (Difference(
         'traction', (), 'wherever the wheels turn',
