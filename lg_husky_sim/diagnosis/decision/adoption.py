@@ -9,6 +9,10 @@ with a probability of at most n times that of one.
 
 Innovations that are not quite white make a gain larger by chance, by their dispersion.
 
+The form of no law is exact. What that of a first effect is off by moves the robot, which all
+sensors see alike: a further effect in how the robot moves has to gain a larger part of the first
+gain than one of a sensor, of which the others know nothing.
+
 The log evidence of an effort without a name is the logarithm of a Bayes factor B. Where nothing is
 missing, its mean is one, so that ``P(B >= b) <= 1 / b`` (Markov), and with n of them that are
 looked at, the largest exceeds ``n / rate`` with a probability of at most that rate.
@@ -21,6 +25,7 @@ import math
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import Subsystem
 from scipy.special import chdtrc
 
 
@@ -52,6 +57,25 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
         count *= max(1.0, seconds / setting('onset_resolution'))
     tail = float(chdtrc(hypothesis.size, 2.0 * max(gain, 0.0) / inflation))
     return min(1.0, count * tail)
+
+
+def least_beside(hypothesis: Hypothesis, first: float) -> float:
+    """
+    Return what an effect has to gain beside a first one.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    first : float
+        Gain of the first effect [nats]; 0 where there is none.
+
+    Returns
+    -------
+    float
+        [nats]
+    """
+    sensor = hypothesis.effect.kind.subsystem is Subsystem.SENSOR
+    return setting('least_sensor_part' if sensor else 'least_part') * first
 
 
 def is_beyond_chance(chance: float) -> bool:

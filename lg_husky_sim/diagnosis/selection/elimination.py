@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance, least_beside
 from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -17,7 +17,7 @@ import numpy as np
 
 
 def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hypothesis],
-               least: float) -> tuple[Fit, list[Hypothesis]]:
+               first: float) -> tuple[Fit, list[Hypothesis]]:
     """
     Drop adopted effects without which the others explain as much.
 
@@ -30,8 +30,8 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
         With all of them.
     found : sequence of Hypothesis
         In the order of adoption.
-    least : float
-        What an effect has to gain [nats].
+    first : float
+        Gain of the first effect [nats].
 
     Returns
     -------
@@ -57,7 +57,7 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
                if unknown.name in {p.name for p in one.free}]
         chance = chance_of(loss, one, 1, evidence, dispersion(
             evidence, final.whitened, final.jacobian[:, own]))
-        if loss >= least and is_beyond_chance(chance):
+        if loss >= least_beside(one, first) and is_beyond_chance(chance):
             break
         final = fit
         kept = [h for h in kept if h is not one]

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import itertools
 import math
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance, least_beside
 from lg_husky_sim.diagnosis.evidence.dispersion import accident, dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -177,7 +177,7 @@ def is_distorted(base: Fit) -> bool:
 
 
 def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
-                 nominal: Point | None, least: float = 0.0,
+                 nominal: Point | None, first: float = 0.0,
                  seeds: Sequence[Tried] = ()) -> Round:
     """
     Look at hypotheses, fit the best of them and compare them under one noise.
@@ -190,8 +190,8 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     pool : sequence of Hypothesis
     nominal : Point, optional
         Another point of the base's structure to begin from: the nominal one.
-    least : float
-        Gain below which nothing is adopted [nats].
+    first : float
+        Gain of the first effect of the search [nats], of which others need a part.
     seeds : sequence of Tried
         What was found on another way than from the base.
 
@@ -201,6 +201,8 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     """
     seen = _looks(evidence, base, pool, None if nominal is not None else ())
     few = int(setting('fitted'))
+    # Which effect it will be, and so how much it needs, is not known yet.
+    least = setting('least_sensor_part') * first
     if not seeds and (not seen or setting('look_trust') * seen[0].gain < least):
         return Round(evidence, base, (), False, 1.0, tuple(seen))
     tried = fitted(evidence, base, seen[:few], [base.point], whole=False)
@@ -224,7 +226,8 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     tried = [_best_form(evidence, base, t) for t in tried[:2]] + tried[2:]
-    tried.sort(key=lambda t: (is_negligible(t, evidence.noise.values),
+    tried.sort(key=lambda t: (t.gain < least_beside(t.hypothesis, first),
+                              is_negligible(t, evidence.noise.values),
                               _once(evidence, base, t) - t.score))
     tried = _from_the_start(evidence, base, tried)
     best = tried[0]

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from lg_husky_sim.diagnosis.decision.adoption import least_beside
 from lg_husky_sim.diagnosis.evidence.base_clock import ticking
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -328,16 +329,17 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     plain = base
     rounds: list[Round] = []
     found: list[Hypothesis] = []
-    least = 0.0
+    first = 0.0
     while len(rounds) < int(setting('most_effects')):
         number = len(rounds)
         progress(f'looking for effect {number + 1}', 0.1 + 0.25 * number)
         one = forward_step(evidence, base, hypotheses(base.point.structure),
-                           None if found else start, least, seeds)
+                           None if found else start, first, seeds)
         seeds = []
         best = one.tried[0] if one.tried else None
         evidence = one.evidence
-        adopted = best is not None and one.adopted and best.gain >= least
+        adopted = best is not None and one.adopted and best.gain >= least_beside(
+            best.hypothesis, first)
         if postponed and not found:
             chosen = best_reading(evidence, one.base)
             if not adopted or best is None or one.base.cost - chosen.cost >= best.gain:
@@ -357,13 +359,13 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             base = one.base
             break
         found.append(best.hypothesis)
-        least = setting('least_part') * rounds[0].tried[0].gain
+        first = rounds[0].tried[0].gain
         evidence, base = _settled(evidence, best.fit.point)
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
             postponed = False
     if len(found) > 1:
-        base, kept = eliminated(evidence, plain.point, base, found, least)
+        base, kept = eliminated(evidence, plain.point, base, found, first)
         rounds = [r for r, h in zip(rounds, found, strict=False) if h in kept] + rounds[
             len(found):]
         found = kept
