@@ -28,7 +28,14 @@ from lg_husky_sim.reporting.data import (
     WITH_FINDING,
 )
 from lg_husky_sim.reporting.sections import Cell, Section, Table, Tone
-from lg_husky_sim.reporting.words import capitalised, change, number, plural, with_unit
+from lg_husky_sim.reporting.words import (
+    capitalised,
+    change,
+    number,
+    plural,
+    with_interval,
+    with_unit,
+)
 
 _STREAMS = {'wheels': 'the wheels (`/joint_states`)', 'imu': 'the IMU',
             'pose': 'the pose (`/tf`, odometry)'}
@@ -79,10 +86,8 @@ def size_words(one: Estimate, *, changed: bool = False) -> str:
     """Return a number with its name and interval."""
     if one.name == LATENESS or one.name.removesuffix('_late') in _STREAMS:
         return f'stamps {lateness_words(one)}'
-    unit = '' if one.unit in ('', '1') else f' {one.unit}'
-    interval = f' ({number(one.low)} to {number(one.high)})' if (
-        math.isfinite(one.low) and math.isfinite(one.high)) else ''
-    return f'{label_of(one.name, changed=changed)} {number(one.value)}{unit}{interval}'
+    return (f'{label_of(one.name, changed=changed)} '
+            f'{with_interval(one.value, one.low, one.high, one.unit)}')
 
 
 def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: bool = False

@@ -9,7 +9,7 @@ import math
 
 from lg_husky_sim.diagnosis.result import Estimate
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
-from lg_husky_sim.reporting.words import number, with_unit
+from lg_husky_sim.reporting.words import with_interval
 
 _STREAMS = {'wheels': 'of the wheels (joint states)', 'imu': 'of the IMU',
             'pose': 'of the pose (tf or odometry)'}
@@ -70,16 +70,15 @@ def in_words(numbers: Sequence[Estimate]) -> str:
     """Return estimates as text with their intervals."""
     return ', '.join(
         lateness_words(e) if e.name == LATENESS else
-        f'{e.name.replace("_", " ")} {with_unit(e.value, e.unit)} '
-        f'({number(e.low)} to {number(e.high)})' for e in sized(numbers))
+        f'{e.name.replace("_", " ")} {with_interval(e.value, e.low, e.high, e.unit)}'
+        for e in sized(numbers))
 
 
 def lateness_words(late: Estimate) -> str:
     """Return how late or early stamps are, such as ``0.24 s early (0.22 to 0.25)``."""
     sign = math.copysign(1.0, late.value)
     low, high = sorted((sign * late.low, sign * late.high))
-    return (f'{with_unit(abs(late.value), late.unit)} {"late" if sign > 0.0 else "early"} '
-            f'({number(low)} to {number(high)})')
+    return with_interval(abs(late.value), low, high, late.unit, 'late' if sign > 0.0 else 'early')
 
 
 def effect_words(effect: Effect) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import math
+import sys
 
 #: What every error is. X is ahead and Y to the left of the robot as it stood at the start.
 SIGN = 'measured − predicted'
@@ -92,6 +93,33 @@ def padded(value: float, digits: int = 3) -> str:
 def with_unit(value: float, unit: str, digits: int = 3) -> str:
     """Return a number with its unit; the unit 1 is not written."""
     return f'{number(value, digits)} {unit}' if unit not in ('', '1') else number(value, digits)
+
+
+def with_interval(value: float, low: float, high: float, unit: str = '', word: str = '') -> str:
+    """
+    Return an estimate with its interval, such as ``1.443 m/s (1.441 to 1.445)``.
+
+    Parameters
+    ----------
+    value, low, high : float
+        An interval that is not finite is left out.
+    unit : str
+        The unit 1 is not written.
+    word : str
+        Behind the unit, such as ``late``.
+
+    Returns
+    -------
+    str
+        In three significant digits, or so many that the estimate differs from both ends.
+    """
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return ' '.join(filter(None, (with_unit(value, unit), word)))
+    digits = next((digits for digits in range(3, sys.float_info.dig) if all(
+        end == value or number(end, digits) != number(value, digits) for end in (low, high))),
+        sys.float_info.dig)
+    said = ' '.join(filter(None, (with_unit(value, unit, digits), word)))
+    return f'{said} ({number(low, digits)} to {number(high, digits)})'
 
 
 def change(before: float, after: float, decimals: int = 0) -> str:

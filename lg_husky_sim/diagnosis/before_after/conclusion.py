@@ -19,6 +19,7 @@ from lg_husky_sim.diagnosis.result import (
     Mismatch,
     Rivalry,
 )
+from lg_husky_sim.reporting.words import number, with_interval
 import numpy as np
 
 #: Names of the channels in a diagnosis, with the part of the robot that each belongs to.
@@ -53,9 +54,8 @@ def statement(one: Candidate, settings: Settings) -> str:
     parts = []
     for k, after in enumerate(estimates(one, settings)):
         before = _value(known[after.name], float(one.before[k]))
-        unit = '' if after.unit == '1' else f' {after.unit}'
-        parts.append(f'{known[after.name].meaning} {before:.3g} → {after.value:.3g}{unit} '
-                     f'({after.low:.3g} to {after.high:.3g})')
+        parts.append(f'{known[after.name].meaning} {number(before)} → '
+                     f'{with_interval(after.value, after.low, after.high, after.unit)}')
     return f'{one.change.title[0].upper()}{one.change.title[1:]}: {"; ".join(parts)}.'
 
 

@@ -1,0 +1,26 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers as they are written on pages and in terminals."""
+
+from __future__ import annotations
+
+import math
+
+from lg_husky_sim.reporting.words import with_interval
+import pytest
+
+
+@pytest.mark.parametrize(('estimate', 'text'), [
+    ((1.94, 1.83, 2.05, 'm/s²'), '1.94 m/s² (1.83 to 2.05)'),
+    ((1.4432, 1.4411, 1.4453, 'm/s²'), '1.443 m/s² (1.441 to 1.445)'),
+    ((-0.0155, -0.0157, -0.0153, 'rad/s'), '−0.0155 rad/s (−0.0157 to −0.0153)'),
+    ((0.0, 0.0, 0.25, '1'), '0 (0 to 0.25)'),
+    ((0.2, math.nan, math.nan, 's'), '0.2 s'),
+    ((1.0, 1.0 - 1e-17, 1.0, ''), '1 (1 to 1)')])
+def test_an_estimate_differs_from_the_ends_of_its_interval(
+        estimate: tuple[float, float, float, str], text: str) -> None:
+    assert with_interval(*estimate) == text
+
+
+def test_a_word_stands_behind_the_unit() -> None:
+    assert with_interval(0.24, 0.22, 0.25, 's', 'late') == '0.24 s late (0.22 to 0.25)'
