@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import itertools
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance, least_beside
 from lg_husky_sim.diagnosis.evidence.dispersion import accident, dispersion
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of
@@ -48,6 +48,14 @@ def test_larger_gains_are_less_likely_by_chance(setup: tuple[Evidence, Point]) -
     assert all(b <= a for a, b in itertools.pairwise(chances))
     assert not is_beyond_chance(chances[0])
     assert is_beyond_chance(chances[-1])
+
+
+def test_what_a_law_is_off_by_does_not_make_sensors_or_wheels_and_body_disagree() -> None:
+    """A further effect by which these do needs a smaller part of the first gain."""
+    parts = {h.effect.id: least_beside(h, 100.0) for h in ALL}
+    assert parts['gyro_bias'] == parts['wheel_radius_mismatch'] < parts['payload']
+    assert parts['payload'] == parts['command_slew'] < 100.0
+    assert all(least_beside(h, 0.0) == 0.0 for h in ALL)
 
 
 def test_more_tries_and_an_onset_make_a_gain_likelier_by_chance(

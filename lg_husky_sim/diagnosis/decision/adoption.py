@@ -9,9 +9,9 @@ with a probability of at most n times that of one.
 
 Innovations that are not quite white make a gain larger by chance, by their dispersion.
 
-The form of no law is exact. What that of a first effect is off by moves the robot, which all
-sensors see alike: a further effect in how the robot moves has to gain a larger part of the first
-gain than one of a sensor, of which the others know nothing.
+The form of no law is exact. What that of a first effect is off by turns the wheels and moves the
+body with them: a further effect in how they move has to gain a larger part of the first gain than
+one by which two sensors, or wheels and body, disagree.
 
 The log evidence of an effort without a name is the logarithm of a Bayes factor B. Where nothing is
 missing, its mean is one, so that ``P(B >= b) <= 1 / b`` (Markov), and with n of them that are
@@ -74,8 +74,8 @@ def least_beside(hypothesis: Hypothesis, first: float) -> float:
     float
         [nats]
     """
-    sensor = hypothesis.effect.kind.subsystem is Subsystem.SENSOR
-    return setting('least_sensor_part' if sensor else 'least_part') * first
+    apart = hypothesis.effect.kind.subsystem in (Subsystem.SENSOR, Subsystem.TRACTION)
+    return setting('least_apart' if apart else 'least_part') * first
 
 
 def is_beyond_chance(chance: float) -> bool:

@@ -202,7 +202,7 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     seen = _looks(evidence, base, pool, None if nominal is not None else ())
     few = int(setting('fitted'))
     # Which effect it will be, and so how much it needs, is not known yet.
-    least = setting('least_sensor_part') * first
+    least = setting('least_apart') * first
     if not seeds and (not seen or setting('look_trust') * seen[0].gain < least):
         return Round(evidence, base, (), False, 1.0, tuple(seen))
     tried = fitted(evidence, base, seen[:few], [base.point], whole=False)
