@@ -12,7 +12,7 @@ import math
 
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import Prior
-from lg_husky_sim.diagnosis.before_after.judge import exchange_chance
+from lg_husky_sim.diagnosis.before_after.judge import chance_of_one, exchange_chance
 from lg_husky_sim.diagnosis.before_after.prediction import Base
 from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
 from lg_husky_sim.diagnosis.before_after.settings import Change
@@ -114,12 +114,15 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     anything = every.evidence - evidence.nothing
     all_of_it = np.zeros(n)
     all_of_it[comparison.everything] = every.shift
-    gains, wholes = [], []
+    best_of_all, wholes = [], []
+    own: dict[Change, list[float]] = {one.change: [] for one in candidates}
     best = comparison.shift(evidence, candidates[0].parameters) if candidates else np.zeros(n)
     for way in partitions([q.recording for q in fits.quadratics], later,
                           int(numbers['partitions']), int(numbers['partitions_listed'])):
         weighed = comparison.candidates(comparison.evidence(comparison.without(best, later), way))
-        gains.append(weighed[0].gain if weighed else 0.0)
+        best_of_all.append(weighed[0].gain if weighed else 0.0)
+        for one in weighed:
+            own[one.change].append(one.gain)
         other = comparison.evidence(comparison.without(all_of_it, later), way)
         wholes.append(other.solve(comparison.everything).evidence - other.nothing)
     shared, moved = every.shared, all_of_it
@@ -132,8 +135,9 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     bounds = fits.base.bounds()
     return Block(
         fits.base, np.clip(before, *bounds), np.clip(after, *bounds), fits.noise,
-        tuple(replace(one, chance=exchange_chance(one.gain, gains, numbers))
-              for one in candidates), comparison.explained(evidence), anything,
+        tuple(replace(one, chance=comparison.chance(
+            one, own[one.change], best_of_all, len(candidates))) for one in candidates),
+        comparison.explained(evidence), anything,
         exchange_chance(anything, wholes, numbers))
 
 
@@ -285,6 +289,17 @@ class _Comparison:
             (lower[index], upper[index])).estimated(
                 numbers['recordings_body' if base.given else 'recordings_loop'],
                 int(numbers['recording_rounds']), numbers['recording_free'])
+
+    def chance(self, one: Candidate, own: Sequence[float], best: Sequence[float], count: int
+               ) -> float:
+        """
+        Return how probable a gain is on a robot that has not changed.
+
+        What the recordings are not fitted with shows no deviation of its own from one to another.
+        """
+        if set(one.parameters) & set(self.fits.base.settings.runs_as):
+            return exchange_chance(one.gain, best, self.numbers)
+        return chance_of_one(one.gain, own, best, count, self.numbers)
 
     def candidates(self, evidence: Evidence) -> list[Candidate]:
         """

@@ -22,6 +22,40 @@ def is_beyond_chance(one: Weighed, numbers: Mapping[str, float]) -> bool:
     return one.gain > 0.0 and one.chance < numbers['false_alarm_rate']
 
 
+def chance_of_one(gain: float, own: Sequence[float], best: Sequence[float], count: int,
+                  numbers: Mapping[str, float]) -> float:
+    """
+    Return how probable the gain of one of several changes is where nothing has changed.
+
+    By what it gains in the other partitions itself, with what the best of all gains there as the
+    expected mean, if that is more; for each of those that are weighed (Bonferroni)::
+
+        b = max(null_gain, mean of the best),  P = count (1 + gain / (a b + sum))^-(a + n)
+
+    or by the best of all, where that is less: whichever it is that gains by chance.
+
+    Parameters
+    ----------
+    gain : float
+        Of the sets as they are [nats].
+    own, best : sequence of float
+        Of the other partitions: of this change, and of whichever gains most [nats].
+    count : int
+        Changes that are weighed.
+    numbers : mapping of str to float
+        ``decision`` of the settings.
+
+    Returns
+    -------
+    float
+        At most 1.
+    """
+    mean = max([numbers['null_gain'], *([sum(max(one, 0.0) for one in best) / len(best)]
+                                        if best else [])])
+    return min(exchange_chance(gain, best, numbers), count * exchange_chance(
+        gain, own, {**numbers, 'null_gain': mean}))
+
+
 def exchange_chance(gain: float, others: Sequence[float], numbers: Mapping[str, float]) -> float:
     """
     Return how probable a gain is where recordings may change places between the sets.

@@ -9,7 +9,11 @@ from collections.abc import Mapping
 from lg_husky_sim.diagnosis.before_after.comparison import Block, compare, partitions
 from lg_husky_sim.diagnosis.before_after.evidence import Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import Prior
-from lg_husky_sim.diagnosis.before_after.judge import exchange_chance, is_beyond_chance
+from lg_husky_sim.diagnosis.before_after.judge import (
+    chance_of_one,
+    exchange_chance,
+    is_beyond_chance,
+)
 from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of
 from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
 from lg_husky_sim.diagnosis.before_after.settings import settings
@@ -140,6 +144,29 @@ def test_a_gain_is_rare_where_it_is_far_above_those_of_other_partitions() -> Non
             assert np.mean(np.array(chances) < rate) == pytest.approx(rate, abs=0.006)
     assert exchange_chance(-5.0, [1.0, 2.0], numbers) == 1.0
     assert exchange_chance(1000.0, [-3.0] * 9, numbers) < 1e-15
+
+
+def test_what_others_gain_by_chance_does_not_hide_a_change_that_does_not() -> None:
+    numbers = {'null_weight': 2.0, 'null_gain': 5.0}
+    own, best = [2.0] * 9, [75.0] * 9
+    assert chance_of_one(340.0, own, best, 35, numbers) < 1e-3
+    assert exchange_chance(340.0, best, numbers) > 0.01
+    assert chance_of_one(340.0, best, best, 35, numbers) == exchange_chance(340.0, best, numbers)
+    assert chance_of_one(60.0, own, best, 35, numbers) > 0.1
+    assert chance_of_one(9.0, [0.0] * 9, [1.0] * 9, 35, numbers) > 0.01
+    assert chance_of_one(100.0, [], [], 35, numbers) == exchange_chance(100.0, [], numbers)
+
+
+def test_of_many_changes_few_are_beyond_chance() -> None:
+    """Though each has partitions of its own; scales differ from robot to robot."""
+    rng, numbers = np.random.default_rng(6), {'null_weight': 2.0, 'null_gain': 5.0}
+    flagged = []
+    for _ in range(2000):
+        drawn = 3.0 / rng.gamma(2.0) * rng.exponential(size=(20, 10))
+        best = list(drawn[:, 1:].max(axis=0))
+        flagged.append(min(chance_of_one(row[0], list(row[1:]), best, 20, numbers)
+                           for row in drawn) < 0.02)
+    assert np.mean(flagged) < 0.03
 
 
 def test_what_has_changed_is_not_taken_for_chance() -> None:
