@@ -183,6 +183,16 @@ def test_a_deflated_wheel_is_still_this_robot_and_one_twice_as_large_is_not(
     assert differs(0.5)
 
 
+def test_a_stretch_with_one_reading_of_the_wheels_says_nothing(clean: Recording) -> None:
+    whole, = segments(clean)
+    once = {name: TimeSeries(series.times[:1], series.values[:1], series.names)
+            if name.startswith('wheel') else series for name, series in whole.streams.items()}
+    one, both = ([found for found in relations(parts) if found.source == 'wheels'] for parts in (
+        (whole,), (whole, replace(whole, streams=once))))
+    assert one
+    assert both == one
+
+
 def test_tyres_that_slip_by_a_resistance_are_no_smaller_wheels(
         record: Make, steps: Sequence[tuple[float, float, float]]) -> None:
     """The robot lags behind its wheels by the same at every speed."""

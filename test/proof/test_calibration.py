@@ -59,8 +59,12 @@ def test_names_that_gain_little_are_less_sure_if_they_are_wrong_oftener() -> Non
 
 
 def test_few_outcomes_do_not_make_certainty() -> None:
-    found = calibrated([line('a', True, gain=1e4, share=0.0, chance=0.0)])
+    features = {'gain': 1e4, 'share': 0.0, 'chance': 0.0}
+    found = calibrated([line('a', True, **features)])
     assert 1.0 / (1.0 + np.exp(-found['name_constant'][0])) < 0.97
+    odds = np.dot([found[name][0] for name in calibration.COEFFICIENTS['known']],
+                  calibration._row('known', features))
+    assert 1.0 / (1.0 + np.exp(-odds)) < 0.99
 
 
 @pytest.mark.parametrize(('features', 'named'), [

@@ -130,7 +130,15 @@ class Evidence:
 
             sd^2 = (weight sd_assumed^2 + sum of E[deviation^2]) / (weight + n_recordings)
 
-        but none is larger than by the places of the recordings alone: see `apart`.
+        but none is larger than by how far apart the fits of the parameter ended, for where
+        parameters depend on each other, derivatives that are a little off promise that a recording
+        is far from where it ended. With places p of curvature c, for each parameter by itself::
+
+            E[deviation^2] = s^2 ((p - m)^2 + 1 / sum of w) + (1 - s) sd^2
+            w = c / (1 + sd^2 c),  s = sd^2 w,  m = sum of w p / sum of w for each set
+
+        So recordings that say nothing of a parameter leave it as assumed, and those that say much
+        add what they are apart (as a moderated variance does, Smyth 2004).
 
         Parameters
         ----------
@@ -145,7 +153,7 @@ class Evidence:
         -------
         Evidence
         """
-        n, most = self.mean.size, self.apart(weight, rounds)
+        n, most = self.mean.size, self._apart(weight, rounds)
         found = replace(self, change_sd=free * self.change_sd)
         for _ in range(rounds):
             at, covariance, _ = found._posterior(np.arange(n))
@@ -166,30 +174,8 @@ class Evidence:
                 / (weight + len(self.quadratics)))))
         return replace(found, change_sd=self.change_sd)
 
-    def apart(self, weight: float, rounds: int) -> FloatArray:
-        """
-        Return the deviations of each parameter by itself, by how far apart recordings ended.
-
-        Where parameters depend on each other, derivatives that are a little off promise that a
-        recording is far from where it ended, which it is not. With places p of curvature c::
-
-            E[deviation^2] = s^2 ((p - m)^2 + 1 / sum of w) + (1 - s) sd^2
-            w = c / (1 + sd^2 c),  s = sd^2 w,  m = sum of w p / sum of w for each set
-
-        So recordings that say nothing of a parameter leave it as assumed, and those that say much
-        add what they are apart (as a moderated variance does, Smyth 2004).
-
-        Parameters
-        ----------
-        weight : float
-            Recordings that the assumed deviations are worth.
-        rounds : int
-            Of the iteration.
-
-        Returns
-        -------
-        numpy.ndarray, shape (n,)
-        """
+    def _apart(self, weight: float, rounds: int) -> FloatArray:
+        # The deviations of each parameter by itself, by how far apart the fits ended.
         sets = [[one for one in self.quadratics if one.after == after] for after in (False, True)]
         known = [(np.array([one.place for one in those]),
                   np.array([np.maximum(np.diag(one.curvature), 0.0) for one in those]))

@@ -151,9 +151,9 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
                          numbers['enough'])
             ends = [[place - lags[other] + lags[name]] for other, place in places.items()
                     if other != name]
-            other = _raced(base, groups[name], here, noise, ends, numbers['enough'])
+            from_others = _raced(base, groups[name], here, noise, ends, numbers['enough'])
             # Of optima that are as likely, its own.
-            return other.z if own.cost - other.cost > numbers['enough'] else own.z
+            return from_others.z if own.cost - from_others.cost > numbers['enough'] else own.z
         places = dict(zip(groups, pool.map(drawn, groups), strict=True))
     found = _quadratics(base, groups, noise, every, places, pool)
     share(1.0)

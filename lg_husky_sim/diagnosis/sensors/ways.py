@@ -68,7 +68,7 @@ def mean_wheel(part: Segment) -> Way | None:
 def mean_direction(part: Segment) -> Way | None:
     """Return for how much longer the wheels have turned forwards than backwards [s]."""
     wheels = mean_wheel(part)
-    if wheels is None:
+    if wheels is None or wheels[0].size < 2:
         return None
     rates = np.gradient(wheels[1], wheels[0])
     return integral(wheels[0], np.clip(rates / setting('least_wheel_motion'), -1.0, 1.0))
