@@ -14,9 +14,10 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
+from lg_husky_sim.diagnosis.before_after.base import Base, base_of
 from lg_husky_sim.diagnosis.before_after.drives import all_drives
-from lg_husky_sim.diagnosis.before_after.fitting import cost_at, fit_set, Prior
-from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of, residual
+from lg_husky_sim.diagnosis.before_after.fitting import costs_at, fit_set, Prior
+from lg_husky_sim.diagnosis.before_after.prediction import residual
 from lg_husky_sim.diagnosis.before_after.runnable import fitted, started
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise, noise_of
@@ -100,7 +101,7 @@ def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
     prior = Prior(base.start, base.sd, np.ones(start.size, dtype=np.bool_))
     noise = first_noise(known)
     options = _options(base)
-    costs = [cost_at(base, drives, prior, noise, one, pool.map) for one in options]
+    costs = costs_at(base, drives, prior, noise, options, pool.map)
     z = options[int(np.argmin(costs))]
     steps, rough = int(setting('base_steps')), known.fit['roughly']
     z = fit_set(base, drives, prior, noise, z, steps, rough, pool.map).z

@@ -1,15 +1,19 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A commercial base: limited commands, a wheel-speed loop, four tyres that saturate."""
+"""
+A commercial base: limited commands, a wheel-speed loop, four tyres that saturate.
+
+Robots with other parameters are simulated side by side, in lanes of loops that become vector
+instructions; each has the bits that it would have alone.
+"""
 
 from __future__ import annotations
 
 from typing import Final
 
-from lg_husky_sim.jit import jit
+from lg_husky_sim.jit import jit, jit_part
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from numpy.typing import NDArray
 
 #: Parameters of the robot, in the order in which the integrator reads them; units and meanings
 #: stand in ``config/before_after.yaml``.
@@ -21,7 +25,7 @@ ROBOT: Final = (
     'mass', 'yaw_inertia', 'com_x', 'com_y', 'com_height', 'radius_left', 'radius_right',
     'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak', 'reference_lag',
     'drag', 'pull', 'scrub', 'scrub_speed', 'dead_voltage', 'bus_resistance', 'droop_rate')
-#: Numbers that are not estimated, read behind them.
+#: Numbers that are not estimated.
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
                 'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate', 'least_share',
                 'scrub_rate', 'pull_speed')
@@ -29,248 +33,336 @@ FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
 #: and what they have come to since the start: base_link's place, the angles of the wheels.
 OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'accel_y',
                   'x', 'y', 'heading', 'angle_left', 'angle_right')
+#: Rows of what the integrator works on.
+ROWS: Final = len(ROBOT) + 51
+# Their places, each with a lane for each robot: parameters, as above; state; and what is worked out
+# within a step. Two one after the other are left and right, four the tyres: front left, rear left,
+# front right, rear right.
+(_SLEW_FORWARD, _SLEW_YAW, _LIMIT_FORWARD, _LIMIT_YAW, _SPEED_GAIN, _TURN_WIDTH, _KFF, _KP, _KI,
+ _V_MAX, _I_MAX, _INERTIA, _DRY, _, _VISCOUS, _, _MU_ALONG, _MU_ACROSS, _CREEP, _SHARE, _ROLLING,
+ _YAW_DAMPING, _MASS, _TURNING, _COM_X, _COM_Y, _HEIGHT, _RADIUS, _, _SLOPE_X, _SLOPE_Y, _TRACK,
+ _DEFLECTION, _LEAK, _LAG, _DRAG, _PULL, _SCRUB, _SCRUB_SPEED, _DEAD, _BUS_RESISTANCE, _DROOP,
+ _V, _U, _R, _WHEEL, _, _SLOW_V, _SLOW_W, _ACC_X, _ACC_Y, _HELD, _,
+ _ALONG, _, _, _, _ACROSS, _, _, _,
+ _A00, _A02, _A11, _A12, _A22, _B0, _B1, _B2, _FRONT, _LEFT, _GX, _GY, _BUS,
+ _SOFT, _, _, _, _A, _, _FIXED, _, _VOLTS, _, _WANTED, _, _D, _, _NW, _,
+ _FOLLOW, _BUILD, _KEPT) = range(ROWS)
+
+
+@jit_part
+def _within(value: float, lower: float, upper: float) -> float:
+    least = lower if value < lower else value
+    return upper if least > upper else least
+
+
+@jit_part
+def _begin(z: FloatArray, p: FloatArray, start: FloatArray, fixed: FloatArray, step: float,
+           out: FloatArray) -> None:
+    resistance, emf, radius, dry_speed = fixed[1], fixed[2], fixed[3], fixed[5]
+    for j in range(z.shape[1]):
+        for i in range(p.shape[0]):
+            z[i, j] = p[i, j]
+        z[_BUILD, j] = step / z[_DEFLECTION, j]
+        z[_KEPT, j] = np.exp(-z[_LEAK, j] * step)
+        z[_FOLLOW, j] = 1.0 - np.exp(-step / z[_LAG, j])
+        z[_V, j] = start[0, j] - start[2, j] * z[_COM_Y, j]
+        z[_U, j] = start[1, j] + start[2, j] * z[_COM_X, j]
+        z[_R, j] = start[2, j]
+        # An integral slower than a second is not built up yet.
+        built = z[_KI, j] / (z[_KI, j] + z[_KFF, j])
+        for s in range(2):
+            w = start[3 + s, j]
+            e = (z[_DRY + s, j] * w / np.sqrt(w * w + dry_speed * dry_speed)
+                 + z[_VISCOUS + s, j] * w)
+            z[_WHEEL + s, j] = w
+            z[_HELD + s, j] = built * (e / (emf / resistance) + (emf - z[_KFF, j]) * w)
+        z[_SLOW_V, j] = 0.5 * radius * (start[3, j] + start[4, j]) / z[_SPEED_GAIN, j]
+        z[_SLOW_W, j] = radius * (start[4, j] - start[3, j]) / z[_TURN_WIDTH, j]
+        for i in range(5, 12):
+            out[0, i, j] = 0.0
+
+
+@jit_part
+def _chassis(z: FloatArray, cosine: float, sine: float, command: FloatArray, k: int, step: float,
+             fixed: FloatArray) -> None:
+    # [m v, m u, jz r] before the tyres, whose secant slopes are added to the matrix.
+    half, rolling_speed, gravity = 0.5 * fixed[0], fixed[6], fixed[7]
+    least, scrub_rate, pull_speed = fixed[9], fixed[10], fixed[11]
+    for j in range(z.shape[1]):
+        z[_SLOW_V, j] += z[_FOLLOW, j] * (command[k, 0, j] - z[_SLOW_V, j])
+        z[_SLOW_W, j] += z[_FOLLOW, j] * (command[k, 1, j] - z[_SLOW_W, j])
+        gx = -(z[_SLOPE_X, j] * cosine + z[_SLOPE_Y, j] * sine)
+        gy = -(-z[_SLOPE_X, j] * sine + z[_SLOPE_Y, j] * cosine)
+        side = 0.5 * z[_TRACK, j]
+        height = z[_HEIGHT, j]
+        front = 0.5 * (1.0 + (z[_COM_X, j] - height * z[_ACC_X, j] / gravity) / half)
+        left = 0.5 * (1.0 + (z[_COM_Y, j] - height * z[_ACC_Y, j] / gravity) / side)
+        v, u, r, mass = z[_V, j], z[_U, j], z[_R, j], z[_MASS, j]
+        m, jz = mass / step, z[_TURNING, j] / step
+        moving = v * v + side * side * r * r
+        z[_A00, j] = m + z[_ROLLING, j] * mass * gravity / np.sqrt(
+            v * v + rolling_speed * rolling_speed) + z[_DRAG, j] * abs(v)
+        z[_A02, j] = 0.0
+        z[_A11, j] = m
+        z[_A12, j] = 0.0
+        z[_A22, j] = jz + z[_YAW_DAMPING, j] + z[_SCRUB_SPEED, j] * abs(v) + z[
+            _SCRUB, j] / np.sqrt(r * r + scrub_rate * scrub_rate)
+        z[_B0, j] = m * v + mass * r * u + mass * gx
+        z[_B1, j] = m * u - mass * r * v + mass * gy
+        z[_B2, j] = jz * r + z[_PULL, j] * moving / (moving + pull_speed * pull_speed)
+        z[_FRONT, j] = _within(front, least, 1.0 - least)
+        z[_LEFT, j] = _within(left, least, 1.0 - least)
+        z[_GX, j] = gx
+        z[_GY, j] = gy
+
+
+@jit_part
+def _supply(z: FloatArray, k: int, step: float, fixed: FloatArray) -> None:
+    # What the loops ask for, both chopped from one supply, whose voltage their currents lower.
+    resistance, emf, radius = fixed[1], fixed[2], fixed[3]
+    for j in range(z.shape[1]):
+        turn_width, slow_w, kff, kp = z[_TURN_WIDTH, j], z[_SLOW_W, j], z[_KFF, j], z[_KP, j]
+        ahead, v_max = z[_SPEED_GAIN, j] * z[_SLOW_V, j], z[_V_MAX, j]
+        w_left, w_right = z[_WHEEL, j], z[_WHEEL + 1, j]
+        wanted_left = (ahead + -0.5 * turn_width * slow_w) / radius
+        wanted_right = (ahead + 0.5 * turn_width * slow_w) / radius
+        left = kff * wanted_left + kp * (wanted_left - w_left) + z[_HELD, j]
+        right = kff * wanted_right + kp * (wanted_right - w_right) + z[_HELD + 1, j]
+        left_duty = _within(left / v_max, -1.0, 1.0)
+        right_duty = _within(right / v_max, -1.0, 1.0)
+        weak = z[_BUS_RESISTANCE, j] / resistance
+        z[_BUS, j] = (1.0 - z[_DROOP, j] * step * k + weak * emf * (
+            left_duty * w_left + right_duty * w_right) / v_max) / (
+                1.0 + weak * (left_duty * left_duty + right_duty * right_duty))
+        z[_WANTED, j], z[_WANTED + 1, j] = wanted_left, wanted_right
+        z[_VOLTS, j], z[_VOLTS + 1, j] = left, right
+
+
+@jit_part
+def _tyre(z: FloatArray, s: int, f: int, fixed: FloatArray) -> None:
+    half, gravity, i = 0.5 * fixed[0], fixed[7], 2 * s + f
+    for j in range(z.shape[1]):
+        side, left, front = 0.5 * z[_TRACK, j], z[_LEFT, j], z[_FRONT, j]
+        y = (side if s == 0 else -side) - z[_COM_Y, j]
+        x = (half if f == 0 else -half) - z[_COM_X, j]
+        load = z[_MASS, j] * gravity * (left if s == 0 else 1.0 - left) * (
+            front if f == 0 else 1.0 - front)
+        rolled, r, build = z[_RADIUS + s, j] * z[_WHEEL + s, j], z[_R, j], z[_BUILD, j]
+        sx = (z[_V, j] - r * y - rolled) / z[_MU_ALONG, j]
+        sy = (z[_U, j] + r * x) / z[_MU_ACROSS, j]
+        edge = z[_CREEP, j] + z[_SHARE, j] * abs(rolled)
+        soft = 1.0 + build * (np.sqrt(sx * sx + sy * sy) + edge)
+        c = load * build / soft
+        ox = load * z[_ALONG + i, j] / soft
+        oy = load * z[_ACROSS + i, j] / soft
+        z[_SOFT + i, j] = soft
+        z[_FIXED + s, j] = ox if f == 0 else z[_FIXED + s, j] + ox
+        z[_A + s, j] = c if f == 0 else z[_A + s, j] + c
+        z[_B0, j] -= ox
+        z[_B1, j] -= oy
+        z[_B2, j] += ox * y - oy * x
+        z[_A11, j] += c
+        z[_A12, j] += c * x
+        z[_A22, j] += c * x * x
+
+
+@jit_part
+def _two_tyres(z: FloatArray, s: int, fixed: FloatArray) -> None:
+    # Of one side. Sides and axles are written out: rows are known when code is compiled then, and
+    # the loops over lanes become vector instructions.
+    _tyre(z, s, 0, fixed)
+    _tyre(z, s, 1, fixed)
+    for j in range(z.shape[1]):
+        y = (0.5 if s == 0 else -0.5) * z[_TRACK, j] - z[_COM_Y, j]
+        a = z[_A + s, j]
+        z[_A00, j] += a
+        z[_A02, j] -= a * y
+        z[_A22, j] += a * y * y
+
+
+@jit_part
+def _measured_wheel(z: FloatArray, s: int, wheels: FloatArray, k: int) -> None:
+    # The forces with the wheel's rate known.
+    for j in range(z.shape[1]):
+        y = (0.5 if s == 0 else -0.5) * z[_TRACK, j] - z[_COM_Y, j]
+        push = z[_A + s, j] * z[_RADIUS + s, j] * wheels[k + 1, s, j]
+        z[_B0, j] += push
+        z[_B2, j] -= push * y
+
+
+@jit_part
+def _driven_wheel(z: FloatArray, s: int, step: float, fixed: FloatArray) -> None:
+    resistance, emf, dry_speed, rest_rate = fixed[1], fixed[2], fixed[5], fixed[8]
+    volt_per_amp = emf / resistance
+    for j in range(z.shape[1]):
+        y = (0.5 if s == 0 else -0.5) * z[_TRACK, j] - z[_COM_Y, j]
+        w, wanted, volts, bus = z[_WHEEL + s, j], z[_WANTED + s, j], z[_VOLTS + s, j], z[_BUS, j]
+        radius, a, dead, i_max = z[_RADIUS + s, j], z[_A + s, j], z[_DEAD, j], z[_I_MAX, j]
+        kp, held, inertia = z[_KP, j], z[_HELD + s, j], z[_INERTIA, j]
+        loss = z[_VISCOUS + s, j] + z[_DRY + s, j] / np.sqrt(w * w + dry_speed * dry_speed)
+        clipped = _within(volts, -z[_V_MAX, j], z[_V_MAX, j])
+        lost = _within(clipped, -dead, dead)
+        amps = (bus * (clipped - lost) - emf * w) / resistance
+        limited, free = abs(amps) > i_max, clipped == volts
+        # The torque, and its slope by the wheel's rate, are implicit.
+        slope = inertia / step + loss + radius * radius * a
+        carried = slope + volt_per_amp * emf
+        regulated = carried + volt_per_amp * bus * kp
+        d = slope if limited else (regulated if free else carried)
+        most = emf * (i_max if amps > 0.0 else -i_max)
+        asked = volt_per_amp * bus * ((z[_KFF, j] + kp) * wanted + held - lost)
+        given = volt_per_amp * bus * (clipped - lost)
+        nw = (inertia / step * w + radius * z[_FIXED + s, j]) + (
+            most if limited else (asked if free else given))
+        grown = held + z[_KI, j] * (wanted - w) * step
+        held = grown if free and not limited else held
+        faded = held * z[_KEPT, j]
+        z[_HELD + s, j] = faded if abs(wanted) < rest_rate else held
+        # Wheel eliminated: w' = (nw + R a (v' - r' y)) / d.
+        g = radius * a
+        z[_B0, j] += g * nw / d
+        z[_B2, j] -= y * g * nw / d
+        less = g * g / d
+        z[_A00, j] -= less
+        z[_A02, j] += less * y
+        z[_A22, j] -= less * y * y
+        z[_D + s, j] = d
+        z[_NW + s, j] = nw
+
+
+@jit_part
+def _solved(z: FloatArray, out: FloatArray, k: int, step: float, keep: float) -> None:
+    # Symmetric 3x3, without a coupling of forward and lateral.
+    for j in range(z.shape[1]):
+        a00, a02, a11, a12, a22 = z[_A00, j], z[_A02, j], z[_A11, j], z[_A12, j], z[_A22, j]
+        b0, b1, b2 = z[_B0, j], z[_B1, j], z[_B2, j]
+        k00 = a11 * a22 - a12 * a12
+        k01 = a02 * a12
+        k02 = -(a02 * a11)
+        det = a00 * k00 + a02 * k02
+        v, u, r = z[_V, j], z[_U, j], z[_R, j]
+        nv = (k00 * b0 + k01 * b1 + k02 * b2) / det
+        nu = (k01 * b0 + (a00 * a22 - a02 * a02) * b1 - a00 * a12 * b2) / det
+        fx = (nv - v) / step - r * u - z[_GX, j]
+        fy = (nu - u) / step + r * v - z[_GY, j]
+        z[_ACC_X, j] += keep * (fx - z[_ACC_X, j])
+        z[_ACC_Y, j] += keep * (fy - z[_ACC_Y, j])
+        out[k + 1, 5, j] = fx
+        out[k + 1, 6, j] = fy
+        z[_V, j] = nv
+        z[_U, j] = nu
+        z[_R, j] = (k02 * b0 - a00 * a12 * b1 + a00 * a11 * b2) / det
+
+
+@jit_part
+def _turned(z: FloatArray, s: int) -> None:
+    for j in range(z.shape[1]):
+        y = (0.5 if s == 0 else -0.5) * z[_TRACK, j] - z[_COM_Y, j]
+        z[_WHEEL + s, j] = (z[_NW + s, j] + z[_RADIUS + s, j] * z[_A + s, j] * (
+            z[_V, j] - z[_R, j] * y)) / z[_D + s, j]
+
+
+@jit_part
+def _followed(z: FloatArray, s: int, wheels: FloatArray, k: int) -> None:
+    for j in range(z.shape[1]):
+        z[_WHEEL + s, j] = wheels[k + 1, s, j]
+
+
+@jit_part
+def _bent(z: FloatArray, s: int, f: int, half: float) -> None:
+    # The deflections of a tyre.
+    i = 2 * s + f
+    for j in range(z.shape[1]):
+        y = (0.5 if s == 0 else -0.5) * z[_TRACK, j] - z[_COM_Y, j]
+        x = (half if f == 0 else -half) - z[_COM_X, j]
+        build, soft, r = z[_BUILD, j], z[_SOFT + i, j], z[_R, j]
+        z[_ALONG + i, j] = (z[_ALONG + i, j] + build * (
+            z[_V, j] - r * y - z[_RADIUS + s, j] * z[_WHEEL + s, j])) / soft
+        z[_ACROSS + i, j] = (z[_ACROSS + i, j] + build * (z[_U, j] + r * x)) / soft
+
+
+@jit_part
+def _speeds(z: FloatArray, out: FloatArray, k: int) -> None:
+    for j in range(z.shape[1]):
+        out[k, 0, j] = z[_V, j] + z[_R, j] * z[_COM_Y, j]
+        out[k, 1, j] = z[_U, j] - z[_R, j] * z[_COM_X, j]
+        out[k, 2, j] = z[_R, j]
+        out[k, 3, j] = z[_WHEEL, j]
+        out[k, 4, j] = z[_WHEEL + 1, j]
+
+
+@jit_part
+def _places(z: FloatArray, out: FloatArray, k: int, step: float) -> None:
+    # Trapezoids, along the heading in the middle of the step.
+    for j in range(z.shape[1]):
+        middle = out[k, 9, j] + 0.25 * step * (out[k, 2, j] + out[k + 1, 2, j])
+        cos, sin = np.cos(middle), np.sin(middle)
+        ahead = 0.5 * step * (out[k, 0, j] + out[k + 1, 0, j])
+        aside = 0.5 * step * (out[k, 1, j] + out[k + 1, 1, j])
+        out[k + 1, 7, j] = out[k, 7, j] + cos * ahead - sin * aside
+        out[k + 1, 8, j] = out[k, 8, j] + sin * ahead + cos * aside
+    for i in range(3):
+        for j in range(z.shape[1]):
+            out[k + 1, 9 + i, j] = out[k, 9 + i, j] + 0.5 * step * (
+                out[k, 2 + i, j] + out[k + 1, 2 + i, j])
 
 
 @jit
-def simulate(p: FloatArray, step: float, command: FloatArray, level: FloatArray,
-             wheels: FloatArray, given: bool, start: FloatArray, out: FloatArray) -> None:
+def simulate(p: FloatArray, fixed: FloatArray, step: float, command: FloatArray,
+             level: FloatArray, wheels: FloatArray, given: bool, start: FloatArray,
+             lanes: tuple[int, ...], out: FloatArray) -> None:
     """
-    Integrate the robot; stiff terms are implicit with the slope of the moment's secant.
+    Integrate robots; stiff terms are implicit with the slope of the moment's secant.
 
     Parameters
     ----------
-    p : numpy.ndarray, shape (n_robot + n_fixed,)
-        As `ROBOT`, then `FIXED`.
+    p : numpy.ndarray, shape (n_robot, n_lanes)
+        As `ROBOT`, for each robot.
+    fixed : numpy.ndarray, shape (n_fixed,)
+        As `FIXED`.
     step : float
         [s].
-    command : numpy.ndarray, shape (n, 2)
+    command : numpy.ndarray, shape (n, 2, n_lanes)
         Mean of the accepted command in each step [m/s, rad/s].
     level : numpy.ndarray, shape (n, 2)
         Cosine and sine of the heading; zeros where it is not known.
-    wheels : numpy.ndarray, shape (n + 1, 2)
+    wheels : numpy.ndarray, shape (n + 1, 2, n_lanes)
         Measured wheel rates [rad/s]; followed where `given`.
     given : bool
-    start : numpy.ndarray, shape (5,)
+    start : numpy.ndarray, shape (5, n_lanes)
         Forward and lateral speed, yaw rate, wheel rates.
-    out : numpy.ndarray, shape (n + 1, 12)
+    lanes : tuple of int
+        An entry of any value for each robot: the length of a tuple is known to the compiler.
+    out : numpy.ndarray, shape (n + 1, 12, n_lanes)
         Filled with `OUTPUTS`.
     """
-    speed_gain, turn_width = p[4], p[5]
-    kff, kp, ki, v_max, i_max, inertia = p[6], p[7], p[8], p[9], p[10], p[11]
-    mux, muy, creep, share, rolling, yaw_damping = p[16], p[17], p[18], p[19], p[20], p[21]
-    mass, turning, xc, yc, height = p[22], p[23], p[24], p[25], p[26]
-    slope_x, slope_y, track = p[29], p[30], p[31]
-    build = step / p[32]
-    drag, pull, scrub, scrub_speed = p[35], p[36], p[37], p[38]
-    dead, bus_resistance, droop = p[39], p[40], p[41]
-    wheelbase, resistance, emf, radius = p[42], p[43], p[44], p[45]
-    load_time, dry_speed, rolling_speed, gravity, rest_rate = p[46], p[47], p[48], p[49], p[50]
-    least_share, scrub_rate, pull_speed = p[51], p[52], p[53]
-    kept = np.exp(-p[33] * step)
-    follow = 1.0 - np.exp(-step / p[34])
-    half, side = 0.5 * wheelbase, 0.5 * track
-    radii = (p[27], p[28])
-    dry = (p[12], p[13])
-    viscous = (p[14], p[15])
-    volt_per_amp = emf / resistance
-    v, u, r = start[0] - start[2] * yc, start[1] + start[2] * xc, start[2]
-    w = np.array([start[3], start[4]])
-    held = np.zeros(2)
-    # An integral slower than a second is not built up yet.
-    built = ki / (ki + kff)
-    for s in range(2):
-        e = dry[s] * w[s] / np.sqrt(w[s] * w[s] + dry_speed * dry_speed) + viscous[s] * w[s]
-        held[s] = built * (e / volt_per_amp + (emf - kff) * w[s])
-    slow_v = 0.5 * radius * (w[0] + w[1]) / speed_gain
-    slow_w = radius * (w[1] - w[0]) / turn_width
-    acc_x, acc_y = 0.0, 0.0
-    keep = step / (step + load_time)
-    a = np.zeros(2)
-    fixed = np.zeros(2)
-    volts = np.zeros(2)
-    wanted = np.zeros(2)
-    d = np.zeros(2)
-    bristle = np.zeros((4, 2))
-    soft = np.zeros(4)
-    nw = np.zeros(2)
-    m = mass / step
-    jz = turning / step
-    out[0, 0] = v + r * yc
-    out[0, 1] = u - r * xc
-    out[0, 2] = r
-    out[0, 3] = w[0]
-    out[0, 4] = w[1]
-    for i in range(5, 12):
-        out[0, i] = 0.0
-    for k in range(command.shape[0]):
-        slow_v += follow * (command[k, 0] - slow_v)
-        slow_w += follow * (command[k, 1] - slow_w)
-        gx = -(slope_x * level[k, 0] + slope_y * level[k, 1])
-        gy = -(-slope_x * level[k, 1] + slope_y * level[k, 0])
-        front = 0.5 * (1.0 + (xc - height * acc_x / gravity) / half)
-        left = 0.5 * (1.0 + (yc - height * acc_y / gravity) / side)
-        front = min(max(front, least_share), 1.0 - least_share)
-        left = min(max(left, least_share), 1.0 - least_share)
-        # Chassis: [m v, m u, jz r] with the tyres' secant slopes c.
-        a00 = m + rolling * mass * gravity / np.sqrt(v * v + rolling_speed * rolling_speed)
-        a00 += drag * abs(v)
-        a01, a02, a11, a12 = 0.0, 0.0, m, 0.0
-        a22 = jz + yaw_damping + scrub_speed * abs(v) + scrub / np.sqrt(
-            r * r + scrub_rate * scrub_rate)
-        moving = v * v + side * side * r * r
-        b0 = m * v + mass * r * u + mass * gx
-        b1 = m * u - mass * r * v + mass * gy
-        b2 = jz * r + pull * moving / (moving + pull_speed * pull_speed)
-        bus = 1.0
-        if not given:
-            for s in range(2):
-                turning_part = (-0.5 if s == 0 else 0.5) * turn_width * slow_w
-                wanted[s] = (speed_gain * slow_v + turning_part) / radius
-                volts[s] = kff * wanted[s] + kp * (wanted[s] - w[s]) + held[s]
-            # Both chopped from one supply, whose voltage their currents lower.
-            left_duty = min(max(volts[0] / v_max, -1.0), 1.0)
-            right_duty = min(max(volts[1] / v_max, -1.0), 1.0)
-            weak = bus_resistance / resistance
-            bus = (1.0 - droop * step * k + weak * emf * (
-                left_duty * w[0] + right_duty * w[1]) / v_max) / (
-                    1.0 + weak * (left_duty * left_duty + right_duty * right_duty))
-        for s in range(2):
-            y = (side if s == 0 else -side) - yc
-            a[s] = 0.0
-            fixed[s] = 0.0
-            across = left if s == 0 else 1.0 - left
-            for f in range(2):
-                x = (half if f == 0 else -half) - xc
-                load = mass * gravity * across * (front if f == 0 else 1.0 - front)
-                sx = (v - r * y - radii[s] * w[s]) / mux
-                sy = (u + r * x) / muy
-                edge = creep + share * abs(radii[s] * w[s])
-                i = 2 * s + f
-                soft[i] = 1.0 + build * (np.sqrt(sx * sx + sy * sy) + edge)
-                c = load * build / soft[i]
-                ox = load * bristle[i, 0] / soft[i]
-                oy = load * bristle[i, 1] / soft[i]
-                fixed[s] += ox
-                b0 -= ox
-                b1 -= oy
-                b2 += ox * y - oy * x
-                a[s] += c
-                a11 += c
-                a12 += c * x
-                a22 += c * x * x
-            a00 += a[s]
-            a02 -= a[s] * y
-            a22 += a[s] * y * y
-            if given:
-                # The forces with the wheel's rate known.
-                push = a[s] * radii[s] * wheels[k + 1, s]
-                b0 += push
-                b2 -= push * y
-                continue
-            error = wanted[s] - w[s]
-            loss = viscous[s] + dry[s] / np.sqrt(w[s] * w[s] + dry_speed * dry_speed)
-            d[s] = inertia / step + loss + radii[s] * radii[s] * a[s]
-            nw[s] = inertia / step * w[s] + radii[s] * fixed[s]
-            clipped = min(max(volts[s], -v_max), v_max)
-            lost = min(max(clipped, -dead), dead)
-            amps = (bus * (clipped - lost) - emf * w[s]) / resistance
-            if abs(amps) > i_max:
-                nw[s] += emf * (i_max if amps > 0.0 else -i_max)
-            else:
-                d[s] += volt_per_amp * emf
-                if clipped == volts[s]:
-                    d[s] += volt_per_amp * bus * kp
-                    nw[s] += volt_per_amp * bus * (
-                        (kff + kp) * wanted[s] + held[s] - lost)
-                else:
-                    nw[s] += volt_per_amp * bus * (clipped - lost)
-            if clipped == volts[s] and abs(amps) <= i_max:
-                held[s] += ki * error * step
-            if abs(wanted[s]) < rest_rate:
-                held[s] *= kept
-            # Wheel eliminated: w' = (nw + R a (v' - r' y)) / d.
-            g = radii[s] * a[s]
-            b0 += g * nw[s] / d[s]
-            b2 -= y * g * nw[s] / d[s]
-            carried = g * g / d[s]
-            a00 -= carried
-            a02 += carried * y
-            a22 -= carried * y * y
-        # Symmetric 3x3.
-        k00 = a11 * a22 - a12 * a12
-        k01 = a02 * a12 - a01 * a22
-        k02 = a01 * a12 - a02 * a11
-        det = a00 * k00 + a01 * k01 + a02 * k02
-        nv = (k00 * b0 + k01 * b1 + k02 * b2) / det
-        nu = (k01 * b0 + (a00 * a22 - a02 * a02) * b1 + (a01 * a02 - a00 * a12) * b2) / det
-        nr = (k02 * b0 + (a01 * a02 - a00 * a12) * b1 + (a00 * a11 - a01 * a01) * b2) / det
-        fx = (nv - v) / step - r * u - gx
-        fy = (nu - u) / step + r * v - gy
-        acc_x += keep * (fx - acc_x)
-        acc_y += keep * (fy - acc_y)
-        out[k + 1, 5] = fx
-        out[k + 1, 6] = fy
-        v, u, r = nv, nu, nr
-        for s in range(2):
-            y = (side if s == 0 else -side) - yc
-            if given:
-                w[s] = wheels[k + 1, s]
-            else:
-                w[s] = (nw[s] + radii[s] * a[s] * (v - r * y)) / d[s]
-            for f in range(2):
-                i = 2 * s + f
-                x = (half if f == 0 else -half) - xc
-                bristle[i, 0] = (bristle[i, 0] + build * (v - r * y - radii[s] * w[s])) / soft[i]
-                bristle[i, 1] = (bristle[i, 1] + build * (u + r * x)) / soft[i]
-        out[k + 1, 0] = v + r * yc
-        out[k + 1, 1] = u - r * xc
-        out[k + 1, 2] = r
-        out[k + 1, 3] = w[0]
-        out[k + 1, 4] = w[1]
-        # Trapezoids, along the heading in the middle of the step.
-        middle = out[k, 9] + 0.25 * step * (out[k, 2] + out[k + 1, 2])
-        cos, sin = np.cos(middle), np.sin(middle)
-        ahead = 0.5 * step * (out[k, 0] + out[k + 1, 0])
-        aside = 0.5 * step * (out[k, 1] + out[k + 1, 1])
-        out[k + 1, 7] = out[k, 7] + cos * ahead - sin * aside
-        out[k + 1, 8] = out[k, 8] + sin * ahead + cos * aside
-        out[k + 1, 9] = out[k, 9] + 0.5 * step * (out[k, 2] + out[k + 1, 2])
-        for s in range(2):
-            out[k + 1, 10 + s] = out[k, 10 + s] + 0.5 * step * (out[k, 3 + s] + out[k + 1, 3 + s])
-
-
-@jit
-def mean_in_bins(rows: FloatArray, start: float, step: float, times: FloatArray,
-                 edges: NDArray[np.intp], later: float, out: FloatArray) -> None:
-    """
-    Read rows at the stamps of samples, and average these in bins.
-
-    Parameters
-    ----------
-    rows : numpy.ndarray, shape (n_rows, k)
-        Evenly spaced in time; between two it is linear.
-    start, step : float
-        Time of the first row and spacing [s].
-    times : numpy.ndarray, shape (n_samples,)
-        Stamps [s].
-    edges : numpy.ndarray of int, shape (n_bins,)
-        First sample of each bin.
-    later : float
-        What is added to the stamps [s].
-    out : numpy.ndarray, shape (n_bins, k)
-        Receives the means.
-    """
-    last = rows.shape[0] - 1.000001
-    for b in range(edges.size):
-        first = edges[b]
-        end = edges[b + 1] if b + 1 < edges.size else times.size
-        for c in range(rows.shape[1]):
-            out[b, c] = 0.0
-        for i in range(first, end):
-            place = min(max((times[i] + later - start) / step, 0.0), last)
-            index = int(place)
-            share = place - index
-            for c in range(rows.shape[1]):
-                out[b, c] += rows[index, c] * (1.0 - share) + rows[index + 1, c] * share
-        for c in range(rows.shape[1]):
-            out[b, c] /= end - first
+    z = np.zeros((ROWS, len(lanes)))
+    half, keep = 0.5 * fixed[0], step / (step + fixed[4])
+    _begin(z, p, start, fixed, step, out)
+    _speeds(z, out, 0)
+    for k in range(level.shape[0]):
+        _chassis(z, level[k, 0], level[k, 1], command, k, step, fixed)
+        if given:
+            _two_tyres(z, 0, fixed)
+            _measured_wheel(z, 0, wheels, k)
+            _two_tyres(z, 1, fixed)
+            _measured_wheel(z, 1, wheels, k)
+        else:
+            _supply(z, k, step, fixed)
+            _two_tyres(z, 0, fixed)
+            _driven_wheel(z, 0, step, fixed)
+            _two_tyres(z, 1, fixed)
+            _driven_wheel(z, 1, step, fixed)
+        _solved(z, out, k, step, keep)
+        if given:
+            _followed(z, 0, wheels, k)
+            _followed(z, 1, wheels, k)
+        else:
+            _turned(z, 0)
+            _turned(z, 1)
+        _bent(z, 0, 0, half)
+        _bent(z, 0, 1, half)
+        _bent(z, 1, 0, half)
+        _bent(z, 1, 1, half)
+        _speeds(z, out, k + 1)
+        _places(z, out, k, step)

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 import math
 
+from lg_husky_sim.diagnosis.before_after.base import Base
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import Prior
 from lg_husky_sim.diagnosis.before_after.judge import chance_of_one, exchange_chance
-from lg_husky_sim.diagnosis.before_after.prediction import Base
 from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
 from lg_husky_sim.diagnosis.before_after.settings import Change
 from lg_husky_sim.diagnosis.before_after.whitening import Noise

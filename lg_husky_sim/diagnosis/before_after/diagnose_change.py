@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from lg_husky_sim.diagnosis.before_after.base import base_of
 from lg_husky_sim.diagnosis.before_after.comparison import Block, compare, refitted
 from lg_husky_sim.diagnosis.before_after.conclusion import findings, mismatches, not_told_apart
 from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.drives import all_drives, Drive
 from lg_husky_sim.diagnosis.before_after.lags import lags_of
-from lg_husky_sim.diagnosis.before_after.prediction import base_of
 from lg_husky_sim.diagnosis.before_after.recording_fits import (
     at_the_edge,
     fit_recordings,

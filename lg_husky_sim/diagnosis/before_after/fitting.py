@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+from lg_husky_sim.diagnosis.before_after.base import Base
 from lg_husky_sim.diagnosis.before_after.drives import Drive
-from lg_husky_sim.diagnosis.before_after.prediction import Base, jacobian, residual
+from lg_husky_sim.diagnosis.before_after.prediction import jacobian, residual, residuals
 from lg_husky_sim.diagnosis.before_after.whitening import Noise
 from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.signals import FloatArray
@@ -79,10 +80,16 @@ def _cost(errors: Sequence[FloatArray], prior: Prior, z: FloatArray) -> float:
     return total if np.isfinite(total) else float(np.inf)
 
 
-def cost_at(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, z: FloatArray,
-            each: Mapper) -> float:
-    """Return the negative log posterior [nats]; infinity where the simulation breaks down."""
-    return _cost(whites(base, drives, noise, z, each), prior, z)
+def costs_at(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise,
+             places: Sequence[FloatArray], each: Mapper) -> list[float]:
+    """
+    Return the negative log posterior at each of some places [nats].
+
+    It is infinite where the simulation breaks down.
+    """
+    rows = list(each(lambda drive: [noise.white(one) for one in residuals(base, drive, places)],
+                     drives))
+    return [_cost([of_drive[k] for of_drive in rows], prior, z) for k, z in enumerate(places)]
 
 
 def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, begin: FloatArray,

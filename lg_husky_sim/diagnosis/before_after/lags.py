@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from lg_husky_sim.diagnosis.before_after.prediction import Base
+from lg_husky_sim.diagnosis.before_after.base import Base
 from lg_husky_sim.diagnosis.sensors.relations import by_names, relations
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.recording import Recording, segments

@@ -4,21 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
 
-from lg_husky_sim.diagnosis.before_after.base_robot import (
-    FIXED,
-    mean_in_bins,
-    OUTPUTS,
-    ROBOT,
-    simulate,
-)
-from lg_husky_sim.diagnosis.before_after.commands import accepted
+from lg_husky_sim.diagnosis.before_after.base import Base
+from lg_husky_sim.diagnosis.before_after.base_robot import OUTPUTS, ROBOT
 from lg_husky_sim.diagnosis.before_after.drives import Bins, Drive
-from lg_husky_sim.diagnosis.before_after.settings import Quantity, Settings
-from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.diagnosis.before_after.means import mean_in_bins
+from lg_husky_sim.diagnosis.before_after.motion import Memory, moved, side_by_side
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
@@ -32,168 +24,60 @@ KINDS = {'left': 'wheels', 'right': 'wheels', 'yaw': 'yaw', 'accel_x': 'accel',
          'accel_y': 'accel', 'ahead': 'place', 'aside': 'place', 'turn': 'heading'}
 
 
-def _columns(first: str, last: str) -> slice:
-    return slice(OUTPUTS.index(first), OUTPUTS.index(last) + 1)
-
-
-@dataclass(frozen=True, eq=False)
-class Base:
-    """
-    The base robot of one nominal model.
-
-    Parameters
-    ----------
-    settings : Settings
-    start, sd : numpy.ndarray, shape (n,)
-        Means and standard deviations of the priors, on the scale of the estimates.
-    fixed : numpy.ndarray
-        Numbers that are not estimated.
-    kinds : tuple of mapping of str to float
-        Values of robots of other kinds, from which a fit begins as well.
-    reference : int
-        Index of the delay of the stream against which those of the others are.
-    given : bool
-        Whether the wheels turn as measured, which leaves the body's motion to be explained.
-    """
-
-    settings: Settings
-    start: FloatArray
-    sd: FloatArray
-    fixed: FloatArray
-    kinds: tuple[Mapping[str, float], ...]
-    reference: int
-    given: bool = False
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Of the parameters."""
-        return tuple(q.name for q in self.settings.quantities)
-
-    @cached_property
-    def _logarithmic(self) -> NDArray[np.bool_]:
-        return np.array([q.logarithmic for q in self.settings.quantities])
-
-    def values(self, z: FloatArray) -> FloatArray:
-        """Return parameters [their units] from the scale of the estimates."""
-        logs = self._logarithmic
-        return np.where(logs, np.exp(np.where(logs, z, 0.0)), z)
-
-    def place(self, name: str, value: float) -> float:
-        """Return a parameter on the scale of the estimates."""
-        quantity = self.settings.quantities[self.names.index(name)]
-        return float(np.log(value)) if quantity.logarithmic else value
-
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Return the bounds on the scale of the estimates."""
-        def scaled(q: Quantity, value: float) -> float:
-            return float(np.log(value)) if q.logarithmic else value
-        quantities = self.settings.quantities
-        return (np.array([scaled(q, q.lower) for q in quantities]),
-                np.array([scaled(q, q.upper) for q in quantities]))
-
-
-def base_of(settings: Settings, nominal: Parameters, given: bool = False,
-            interval: float = 0.0, streams: Collection[str] = CHANNELS) -> Base:
-    """
-    Return the base for the model in doubt.
-
-    Parameters
-    ----------
-    settings : Settings
-    nominal : Parameters
-    given : bool
-        Whether the wheels turn as measured.
-    interval : float
-        Of the wheel rates [s].
-    streams : collection of str
-        That every drive has: delays are against the pose, or else the IMU, or else the wheels.
-
-    Returns
-    -------
-    Base
-    """
-    start = [nominal[q.nominal] if q.start is None else q.start for q in settings.quantities]
-    logs = [q.logarithmic for q in settings.quantities]
-    z = np.array([np.log(x) if log else x for x, log in zip(start, logs, strict=True)])
-    names = [q.name for q in settings.quantities]
-    late = names.index('wheels_late')
-    z[late] += 0.5 * interval
-    sd = np.array([q.sd for q in settings.quantities])
-    sd[late] += 0.5 * interval
-    reference = next((one for one in ('pose', 'imu', 'wheels') if one in streams), 'pose')
-    against = names.index(f'{reference}_late')
-    sd[against] = settings.fit['reference']
-    numbers = {**settings.simulation,
-               'wheelbase': nominal['wheelbase'], 'wheel_radius': nominal['wheel_radius'],
-               'motor_resistance': nominal['motor_resistance'],
-               'transmission': nominal['torque_constant'] * nominal['gear_ratio']}
-    # Without a speed loop the model in doubt says what voltage a command gives.
-    voltages = {
-        'loop_feedforward':
-            nominal['supply_voltage'] * nominal['command_gain'] * nominal['wheel_radius'],
-        'turn_width': 2.0 * nominal['turn_ratio'], 'yaw_damping': nominal['yaw_damping']}
-    return Base(settings, z, sd, np.array([numbers[name] for name in FIXED]),
-                tuple({**kind, **voltages} for kind in settings.kinds), against, given)
-
-
-def _accepted(base: Base, drive: Drive, x: FloatArray, begin: FloatArray) -> FloatArray:
-    value = dict(zip(base.names, x, strict=True))
-    wheels = base.fixed[FIXED.index('wheel_radius')] * begin[3:]
-    now = (0.5 * (wheels[0] + wheels[1]) / value['speed_gain'],
-           (wheels[1] - wheels[0]) / value['turn_width'])
-    rows = np.zeros((2, drive.steps))
-    for row, values, axis, place in zip(rows, drive.command.values.T, ('forward', 'yaw'), now,
-                                        strict=True):
-        accepted(drive.command.times, np.ascontiguousarray(values), value['dead_time'],
-                 value[f'limit_{axis}'], value[f'slew_{axis}'], place, drive.start,
-                 base.settings.simulation['step'], row)
-    return np.ascontiguousarray(rows.T)
-
-
-def moved(base: Base, drive: Drive, x: FloatArray) -> FloatArray:
-    """Simulate a drive, in columns as `OUTPUTS`; `x` in units."""
-    step = base.settings.simulation['step']
-    names = base.names
-    robot = np.concatenate([x[:len(ROBOT)], base.fixed])
-    out = np.empty((drive.steps + 1, len(OUTPUTS)))
-    begin = np.array(drive.begin)
-    mean_rim = (x[names.index('radius_left')] * begin[3]
-                + x[names.index('radius_right')] * begin[4]) / 2.0
-    begin[0] = mean_rim
-    wheels, command = np.zeros((drive.steps + 1, 2)), np.zeros((drive.steps, 2))
-    if base.given:
-        at = drive.start + step * np.arange(drive.steps + 1) + x[names.index('wheels_late')]
-        wheels = np.column_stack([np.interp(at, drive.wheels.times, column)
-                                  for column in drive.wheels.values.T])
-    else:
-        command = _accepted(base, drive, x, begin)
-    simulate(robot, step, command, drive.level, wheels, base.given, begin, out)
-    return out
-
-
-def _read(base: Base, drive: Drive, stream: str, motion: FloatArray, first: str,
-          last: str, later: float) -> FloatArray:
-    # Means in the bins of a stream, of the outputs from the first to the last.
-    bins, rows = drive.bins[stream], motion[:, _columns(first, last)]
-    out = np.empty((bins.edges.size, rows.shape[1]))
-    mean_in_bins(rows, drive.start, base.settings.simulation['step'], bins.times, bins.edges,
-                 later, out)
-    return out
+def _read(base: Base, drive: Drive, stream: str, motion: FloatArray, first: str, last: str,
+          later: FloatArray) -> FloatArray:
+    # Means in the bins of a stream, of the outputs from the first to the last, for each robot:
+    # of its lane, or of the only one.
+    bins, begin, lanes = drive.bins[stream], OUTPUTS.index(first), motion.shape[2]
+    times, which = np.unique(later, return_inverse=True)
+    found = np.empty((times.size, bins.edges.size, OUTPUTS.index(last) + 1 - begin, lanes))
+    for one, out in zip(times, found, strict=True):
+        mean_in_bins(motion, begin, drive.start, base.settings.simulation['step'], bins.times,
+                     bins.edges, one, out)
+    lane = np.minimum(np.arange(later.size), lanes - 1)
+    return np.moveaxis(found[which, :, :, lane], 0, -1)
 
 
 def movements(path: FloatArray) -> FloatArray:
-    """Return the movement between bins in the frame of their mean heading, shape (n - 1, 3)."""
+    """
+    Return the movement between bins in the frame of their mean heading.
+
+    Parameters
+    ----------
+    path : numpy.ndarray, shape (n, 3, ...)
+        x, y and heading.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n - 1, 3, ...)
+    """
     step = np.diff(path, axis=0)
     heading = 0.5 * (path[1:, 2] + path[:-1, 2])
     cos, sin = np.cos(heading), np.sin(heading)
-    return np.column_stack([cos * step[:, 0] + sin * step[:, 1],
-                            cos * step[:, 1] - sin * step[:, 0], step[:, 2]])
+    return np.stack([cos * step[:, 0] + sin * step[:, 1],
+                     cos * step[:, 1] - sin * step[:, 0], step[:, 2]], axis=1)
 
 
-def predicted(base: Base, drive: Drive, x: FloatArray, motion: FloatArray
+def predicted(base: Base, drive: Drive, robots: FloatArray, motion: FloatArray
               ) -> dict[str, FloatArray]:
-    """Return what each stream's bins should read, by stream."""
-    value = dict(zip(base.names, x, strict=True))
+    """
+    Return what the bins of each stream should read of some robots.
+
+    Parameters
+    ----------
+    base : Base
+    drive : Drive
+    robots : numpy.ndarray, shape (m, n)
+        Their parameters, in units.
+    motion : numpy.ndarray, shape (n_steps + 1, n_outputs, n_lanes)
+        As of :func:`moved`; of one robot, if the others only differ by how they are read.
+
+    Returns
+    -------
+    dict of str to numpy.ndarray
+        By stream, shape (n_bins, n_channels, m).
+    """
+    value = dict(zip(base.names, robots.T, strict=True))
     found = {}
     if not base.given and 'wheels' in drive.bins:
         half = 0.5 * value['wheels_window']
@@ -202,32 +86,36 @@ def predicted(base: Base, drive: Drive, x: FloatArray, motion: FloatArray
                          for side in (-half, half))
         found['wheels'] = (after - before) / (2.0 * half)
     if 'imu' in drive.bins:
-        rate, _, _, along, across = _read(base, drive, 'imu', motion, 'yaw', 'accel_y',
-                                          -value['imu_late']).T
-        turning = np.gradient(rate, base.settings.bins['yaw'])
+        rows = _read(base, drive, 'imu', motion, 'yaw', 'accel_y', -value['imu_late'])
+        rate, along, across = rows[:, 0], rows[:, 3], rows[:, 4]
+        turning = np.gradient(rate, base.settings.bins['yaw'], axis=0)
         # Of the IMU from the centre of mass, whose acceleration is simulated.
         ahead, aside = value['imu_x'] - value['com_x'], -value['com_y']
-        found['imu'] = np.column_stack([
+        found['imu'] = np.stack([
             value['gyro_factor'] * rate + value['gyro_bias'],
             along - ahead * rate ** 2 - aside * turning + value['accel_bias_x'],
-            across + ahead * turning - aside * rate ** 2 + value['accel_bias_y']])
+            across + ahead * turning - aside * rate ** 2 + value['accel_bias_y']], axis=1)
     if 'pose' in drive.bins:
-        bins = drive.bins['pose']
         found['pose'] = movements(_read(base, drive, 'pose', motion, 'x', 'heading',
                                         -value['pose_late']))
         if drive.gyro.size:
-            found['pose'][:, 2] = _turn_by_gyro(drive, bins, value)
+            found['pose'][:, 2] = _turn_by_gyro(drive, drive.bins['pose'], value)
     return found
 
 
-def _turn_by_gyro(drive: Drive, bins: Bins, value: Mapping[str, float]) -> FloatArray:
+def _turn_by_gyro(drive: Drive, bins: Bins, value: Mapping[str, FloatArray]) -> FloatArray:
     # A relation of two sensors, linear in the gyro's factor and offset: what the gyro has turned
-    # is to be the factor times what the pose has. No error of the robot's model can enter.
-    times = bins.times - value['pose_late'] + value['imu_late']
-    turned = np.diff(bins.mean(np.interp(times, drive.gyro[:, 0], drive.gyro[:, 1])))
+    # is to be the factor times what the pose has. No error of the robot's model can enter. Most
+    # robots' are the same.
     pose = np.diff(bins.values[:, 2])
-    less = turned - value['gyro_factor'] * pose - value['gyro_bias'] * np.diff(bins.mean(times))
-    return np.asarray(pose - less)
+    rows, which = np.unique(np.column_stack([value[name] for name in (
+        'pose_late', 'imu_late', 'gyro_factor', 'gyro_bias')]), axis=0, return_inverse=True)
+    found = []
+    for pose_late, imu_late, factor, bias in rows.tolist():
+        times = bins.times - pose_late + imu_late
+        turned = np.diff(bins.mean(np.interp(times, drive.gyro[:, 0], drive.gyro[:, 1])))
+        found.append(pose - (turned - factor * pose - bias * np.diff(bins.mean(times))))
+    return np.asarray(np.column_stack(found)[:, which.reshape(-1)])
 
 
 def measured(base: Base, drive: Drive) -> dict[str, FloatArray]:
@@ -239,12 +127,44 @@ def measured(base: Base, drive: Drive) -> dict[str, FloatArray]:
     return found
 
 
+_MEMORY = Memory()
+
+
+def _several(base: Base, drive: Drive, robots: Sequence[FloatArray]
+             ) -> Iterator[tuple[FloatArray, dict[str, FloatArray]]]:
+    # Motion and prediction of as many robots at a time as go together.
+    for first in range(0, len(robots), side_by_side(base)):
+        some = np.array(robots[first:first + side_by_side(base)])
+        motion = moved(base, drive, some, _MEMORY)
+        yield motion, predicted(base, drive, some, motion)
+
+
+def residuals(base: Base, drive: Drive, places: Sequence[FloatArray]
+              ) -> list[dict[str, FloatArray]]:
+    """
+    Return measured less predicted at each of some places.
+
+    Parameters
+    ----------
+    base : Base
+    drive : Drive
+    places : sequence of numpy.ndarray, shape (n,)
+        On the scale of the estimates.
+
+    Returns
+    -------
+    list of dict of str to numpy.ndarray
+        By stream, shape (n_bins, n_channels).
+    """
+    there = measured(base, drive)
+    return [{name: there[name] - rows[..., k] for name, rows in should.items()}
+            for _, should in _several(base, drive, [base.values(z) for z in places])
+            for k in range(next(iter(should.values())).shape[-1])]
+
+
 def residual(base: Base, drive: Drive, z: FloatArray) -> dict[str, FloatArray]:
     """Return measured less predicted, by stream; `z` on the scale of the estimates."""
-    x = base.values(z)
-    there = measured(base, drive)
-    should = predicted(base, drive, x, moved(base, drive, x))
-    return {name: there[name] - should[name] for name in should}
+    return residuals(base, drive, [z])[0]
 
 
 def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
@@ -269,23 +189,33 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
         Its derivatives, shape (n_bins, n_channels, n); zero where the simulation breaks down a
         step away.
     """
-    x = base.values(z)
-    motion = moved(base, drive, x)
-    there, should = measured(base, drive), predicted(base, drive, x, motion)
-    columns = {name: np.zeros((*rows.shape, z.size)) for name, rows in should.items()}
-    upper = base.bounds()[1]
+    quantities, upper = base.settings.quantities, base.bounds()[1]
+    deltas = np.array([q.delta if place + q.delta <= most else -q.delta
+                       for q, place, most in zip(quantities, z, upper, strict=True)])
+    near = {k: base.values(z + deltas[k] * (np.arange(z.size) == k)) for k in np.flatnonzero(free)}
     moving = {*ROBOT, 'wheels_late' if base.given else 'dead_time'}
-    for k, quantity in enumerate(base.settings.quantities):
-        if not free[k]:
-            continue
-        delta = quantity.delta if z[k] + quantity.delta <= upper[k] else -quantity.delta
-        near = np.array(z)
-        near[k] += delta
-        changed = base.values(near)
-        path = moved(base, drive, changed) if quantity.name in moving else motion
-        other = predicted(base, drive, changed, path)
-        diverged = base.settings.simulation['diverged']
-        if all(np.all(np.abs(rows) < diverged) for rows in other.values()):
-            for name, rows in other.items():
-                columns[name][:, :, k] = (should[name] - rows) / delta
+    moves = [k for k in near if quantities[k].name in moving]
+    reads = [k for k in near if quantities[k].name not in moving]
+    there, x = measured(base, drive), base.values(z)
+    columns = {name: np.zeros((*rows.shape, z.size)) for name, rows in there.items()}
+    diverged = base.settings.simulation['diverged']
+    should: dict[str, FloatArray] = {}
+
+    def fill(ks: Sequence[np.intp], others: Mapping[str, FloatArray]) -> None:
+        fine = [i for i in range(len(ks)) if all(
+            np.all(np.abs(rows[..., i]) < diverged) for rows in others.values())]
+        for name, rows in others.items():
+            for i in fine:
+                columns[name][:, :, ks[i]] = (should[name] - rows[..., i]) / deltas[ks[i]]
+    done = 0
+    for motion, others in _several(base, drive, [x, *(near[k] for k in moves)]):
+        if not should:
+            should = {name: rows[..., 0] for name, rows in others.items()}
+            others = {name: rows[..., 1:] for name, rows in others.items()}
+            if reads:
+                fill(reads, predicted(base, drive, np.array([near[k] for k in reads]),
+                                      np.ascontiguousarray(motion[:, :, :1])))
+        count = next(iter(others.values())).shape[-1]
+        fill(moves[done:done + count], others)
+        done += count
     return {name: there[name] - should[name] for name in should}, columns

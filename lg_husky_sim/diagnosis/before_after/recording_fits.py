@@ -14,11 +14,11 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
+from lg_husky_sim.diagnosis.before_after.base import Base
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, joined, Quadratic
-from lg_husky_sim.diagnosis.before_after.fitting import cost_at, fit_set, Prior, SetFit
+from lg_husky_sim.diagnosis.before_after.fitting import costs_at, fit_set, Prior, SetFit
 from lg_husky_sim.diagnosis.before_after.prediction import (
-    Base,
     CHANNELS,
     jacobian,
     measured,
@@ -218,13 +218,14 @@ def _raced(base: Base, drives: Sequence[Drive], about: Prior, noise: Noise,
     # From the likeliest start of each kind, of the best few of which one goes on.
     numbers = base.settings.fit
 
-    def cost(start: FloatArray) -> float:
-        return cost_at(base, drives, about, noise, start, map)
-
     def fit(start: FloatArray, at_most: int) -> SetFit:
         return fit_set(base, drives, about, noise, start, at_most, until, map)
-    nearest = sorted(((cost(one), k, one) for k, kind in enumerate(kinds) for one in [
-        min(kind, key=cost)]), key=lambda one: one[:2])[:int(numbers['raced'])]
+    costs = iter(costs_at(base, drives, about, noise, [
+        one for kind in kinds for one in kind], map))
+    likeliest = [min(((next(costs), k, one) for k, one in enumerate(kind)),
+                     key=lambda one: one[:2]) for kind in kinds]
+    nearest = sorted(((cost, k, one) for k, (cost, _, one) in enumerate(likeliest)),
+                     key=lambda one: one[:2])[:int(numbers['raced'])]
     begun = min((fit(one, int(numbers['race_steps'])) for _, _, one in nearest),
                 key=lambda one: one.cost)
     return fit(begun.z, int(numbers['steps']))

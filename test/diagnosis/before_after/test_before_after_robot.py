@@ -12,6 +12,7 @@ from typing import Any
 
 from lg_husky_sim.diagnosis.before_after import diagnose_change, prediction
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
+from lg_husky_sim.diagnosis.before_after.base import Base, base_of
 from lg_husky_sim.diagnosis.before_after.base_robot import OUTPUTS, ROBOT, simulate
 from lg_husky_sim.diagnosis.before_after.commands import accepted
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
@@ -20,7 +21,6 @@ from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case, ChangeCase
 from lg_husky_sim.diagnosis.before_after.drives import Drive, drives
 from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
-from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of
 from lg_husky_sim.diagnosis.before_after.report import change_report
 from lg_husky_sim.diagnosis.before_after.selection import select
 from lg_husky_sim.diagnosis.before_after.settings import settings
@@ -70,13 +70,14 @@ def driven(name: str, changes: Mapping[str, float], seed: int,
     for row, column, axis in zip(held, commands.T, ('forward', 'yaw'), strict=True):
         accepted(times, np.ascontiguousarray(column), delay, values[f'limit_{axis}'],
                  values[f'slew_{axis}'], 0.0, 0.0, STEP, row)
-    held = np.ascontiguousarray(held.T)
-    out, heading = np.empty((count + 1, len(OUTPUTS))), np.zeros(count + 1)
-    robot = np.concatenate([[values[n] for n in ROBOT], base.fixed])
+    held = np.ascontiguousarray(held.T[:, :, None])
+    rows, heading = np.empty((count + 1, len(OUTPUTS), 1)), np.zeros(count + 1)
+    out, robot = rows[:, :, 0], np.array([[values[n]] for n in ROBOT])
     # A slope needs the heading, which turns as without one.
     for _ in range(2):
         level = np.column_stack([np.cos(heading[:-1]), np.sin(heading[:-1])])
-        simulate(robot, STEP, held, level, np.zeros((count + 1, 2)), False, np.zeros(5), out)
+        simulate(robot, base.fixed, STEP, held, level, np.zeros((count + 1, 2, 1)), False,
+                 np.zeros((5, 1)), (0,), rows)
         heading = np.concatenate([[0.0], np.cumsum(STEP * out[1:, 2])])
     x, y = (np.cumsum(STEP * one) for one in (
         np.cos(heading) * out[:, 0] - np.sin(heading) * out[:, 1],
@@ -349,10 +350,10 @@ def test_a_simulation_that_breaks_down_is_no_place_to_go(monkeypatch: pytest.Mon
     free = np.arange(base.start.size) == mass
     usual = prediction.predicted
 
-    def broken(base: Base, drive: Drive, x: FloatArray, motion: FloatArray
+    def broken(base: Base, drive: Drive, robots: FloatArray, motion: FloatArray
                ) -> dict[str, FloatArray]:
-        found = usual(base, drive, x, motion)
-        return found if x[mass] == middle else {n: rows * np.inf for n, rows in found.items()}
+        whole = np.where(robots[:, mass] == middle, 1.0, np.inf)
+        return {n: rows * whole for n, rows in usual(base, drive, robots, motion).items()}
     middle = base.values(base.start)[mass]
     monkeypatch.setattr(prediction, 'predicted', broken)
     _, columns = prediction.jacobian(base, drive, base.start, free)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from lg_husky_sim.diagnosis.before_after.base import Base, base_of
 from lg_husky_sim.diagnosis.before_after.comparison import Block, compare, partitions
 from lg_husky_sim.diagnosis.before_after.evidence import Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import Prior
@@ -14,7 +15,6 @@ from lg_husky_sim.diagnosis.before_after.judge import (
     exchange_chance,
     is_beyond_chance,
 )
-from lg_husky_sim.diagnosis.before_after.prediction import Base, base_of
 from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from lg_husky_sim.diagnosis.before_after.base import base_of
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
-from lg_husky_sim.diagnosis.before_after.prediction import base_of
 from lg_husky_sim.diagnosis.before_after.selection import remembered, select
 from lg_husky_sim.diagnosis.before_after.settings import Change, settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
