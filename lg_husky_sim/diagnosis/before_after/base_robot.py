@@ -35,9 +35,9 @@ OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'acce
                   'x', 'y', 'heading', 'angle_left', 'angle_right')
 #: Rows of what the integrator works on.
 ROWS: Final = len(ROBOT) + 51
-# Their places, each with a lane for each robot: parameters, as above; state; and what is worked out
-# within a step. Two one after the other are left and right, four the tyres: front left, rear left,
-# front right, rear right.
+# Their places, each with a lane for each robot: parameters, as above; state; and what is worked
+# out within a step. Two one after the other are left and right, four the tyres: front left, rear
+# left, front right, rear right.
 (_SLEW_FORWARD, _SLEW_YAW, _LIMIT_FORWARD, _LIMIT_YAW, _SPEED_GAIN, _TURN_WIDTH, _KFF, _KP, _KI,
  _V_MAX, _I_MAX, _INERTIA, _DRY, _, _VISCOUS, _, _MU_ALONG, _MU_ACROSS, _CREEP, _SHARE, _ROLLING,
  _YAW_DAMPING, _MASS, _TURNING, _COM_X, _COM_Y, _HEIGHT, _RADIUS, _, _SLOPE_X, _SLOPE_Y, _TRACK,

@@ -105,8 +105,8 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
 
     The longest is fitted first, from every kind of robot; the others begin there, or where any
     start is likelier. Then all are fitted twice more, with a prior about their mean that is as
-    wide as a change, and each may begin where any other ended, or at a start from there. At last
-    that prior is as wide as the recordings show themselves to differ, whichever set they are of.
+    wide as a change, and once with one as wide as the recordings show themselves to differ,
+    whichever set they are of. Each may begin where any other ended, or at a start from there.
     Where a fit begins, and what its delays are expected to be, differs by as much as its streams
     say.
 
@@ -138,27 +138,24 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
     groups = _by_recording(drives)
     places, noise, prior = _alone(base, prior, wide, groups, lags, begin, pool, share)
     every = replace(every, mean=prior.mean)
-    common = np.array(begin)
-    for _ in range(int(numbers['drawn'])):
-        about = _deviations(base, prior, wide, places, [
-            q.less(lags[q.recording])
-            for q in _quadratics(base, groups, noise, prior, places, pool)])
-        common = about.mean
+    about = _deviations(base, prior, wide, places, [
+        q.less(lags[q.recording])
+        for q in _quadratics(base, groups, noise, prior, places, pool)])
 
-        def drawn(name: str, about: Prior = about, places: Places = places) -> FloatArray:
-            here = replace(about, mean=about.mean + lags[name])
-            own = _raced(base, groups[name], here, noise, [[places[name]], [here.mean]],
-                         numbers['enough'])
-            ends = [[place - lags[other] + lags[name]] for other, place in places.items()
-                    if other != name]
-            from_others = _raced(base, groups[name], here, noise, ends, numbers['enough'])
-            # Of optima that are as likely, its own.
-            return from_others.z if own.cost - from_others.cost > numbers['enough'] else own.z
-        places = dict(zip(groups, pool.map(drawn, groups), strict=True))
-    found = _quadratics(base, groups, noise, every, places, pool)
+    def drawn(name: str) -> FloatArray:
+        here = replace(about, mean=about.mean + lags[name])
+        own = _raced(base, groups[name], here, noise, [[places[name]], [here.mean]],
+                     numbers['enough'])
+        ends = [[place - lags[other] + lags[name]] for other, place in places.items()
+                if other != name]
+        other = _raced(base, groups[name], here, noise, ends, numbers['enough']) if ends else own
+        # Of optima that are as likely, its own.
+        return other.z if own.cost - other.cost > numbers['enough'] else own.z
+    ended = dict(zip(groups, pool.map(drawn, groups), strict=True))
+    found = _quadratics(base, groups, noise, every, ended, pool)
     share(1.0)
-    return RecordingFits(base, every, noise, common, places, tuple(
-        _with_limits(base, groups[one.recording], noise, every, places, one) for one in found),
+    return RecordingFits(base, every, noise, about.mean, ended, tuple(
+        _with_limits(base, groups[one.recording], noise, every, ended, one) for one in found),
         tuple(drives))
 
 
@@ -215,7 +212,7 @@ def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequ
 
 def _raced(base: Base, drives: Sequence[Drive], about: Prior, noise: Noise,
            kinds: Sequence[Sequence[FloatArray]], until: float) -> SetFit:
-    # From the likeliest start of each kind, of the best few of which one goes on.
+    # From the likeliest start of each kind, of the best few of which one goes on: by halving.
     numbers = base.settings.fit
 
     def fit(start: FloatArray, at_most: int) -> SetFit:
@@ -226,9 +223,12 @@ def _raced(base: Base, drives: Sequence[Drive], about: Prior, noise: Noise,
                      key=lambda one: one[:2]) for kind in kinds]
     nearest = sorted(((cost, k, one) for k, (cost, _, one) in enumerate(likeliest)),
                      key=lambda one: one[:2])[:int(numbers['raced'])]
-    begun = min((fit(one, int(numbers['race_steps'])) for _, _, one in nearest),
-                key=lambda one: one.cost)
-    return fit(begun.z, int(numbers['steps']))
+    alive = [one for _, _, one in nearest]
+    while len(alive) > 1:
+        fits = sorted((fit(one, int(numbers['race_steps'])) for one in alive),
+                      key=lambda one: one.cost)
+        alive = [one.z for one in fits[:len(fits) // 2]]
+    return fit(alive[0], int(numbers['steps']))
 
 
 def at_the_edge(base: Base, drives: Sequence[Drive]) -> Base:
