@@ -3,7 +3,7 @@
 """
 Coefficients of the confidence, from the outcomes of trials.
 
-For each verdict the share right is a logistic function of what informs about it,
+For each kind of answer the share right is a logistic function of what informs about it,
 ``p = 1 / (1 + exp(-(c0 + c1 x1 + ...)))``. The coefficients maximise the likelihood of the
 outcomes with independent Gaussian priors around zero, and around a stated share right for c0, so
 that few outcomes do not make certainty.
@@ -26,17 +26,26 @@ Json = Mapping[str, Any]
 
 FloatArray = NDArray[np.float64]
 
-#: Verdict to the names of its coefficients in the settings of the diagnosis.
+#: Answer to the names of its coefficients in the settings of the diagnosis.
 COEFFICIENTS = {
     'known': ('name_constant', 'name_share', 'name_gain'),
     'nothing_missing': ('nothing_constant', 'nothing_chance'),
     'unknown': ('unknown_constant', 'unknown_share_slope'),
+    'changed': ('change_constant', 'change_chance'),
+    'unchanged': ('unchanged_constant', 'unchanged_chance'),
 }
 
 
+def _answer(line: Json) -> str:
+    """Return what kind of answer was given: the verdict, or whether the robot changed."""
+    if line['kind'] != 'before_after':
+        return str(line['verdict'])
+    return 'unchanged' if line['verdict'] == 'nothing_missing' else 'changed'
+
+
 def _row(verdict: str, features: Json) -> list[float]:
-    """Return what multiplies the coefficients of a verdict."""
-    if verdict == 'nothing_missing':
+    """Return what multiplies the coefficients of an answer."""
+    if verdict in ('nothing_missing', 'unchanged', 'changed'):
         return [1.0, math.log10(max(float(features['chance']), 1e-12))]
     share = math.log(max(float(features['share']), 1e-3))
     if verdict == 'unknown':
@@ -67,17 +76,18 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
     right: dict[str, list[float]] = {name: [] for name in COEFFICIENTS}
     for line in lines:
         mark = judge(line).right
-        if line.get('features') and line['verdict'] in rows and mark is not None:
+        answer = _answer(line)
+        if line.get('features') and answer in rows and mark is not None:
             try:
-                row = _row(line['verdict'], line['features'])
+                row = _row(answer, line['features'])
             except (KeyError, TypeError, ValueError) as error:
                 raise LgHuskyError(f'case {line["case"]}: the features of its confidence need the '
                                    f'numbers share, chance and gain: {error}') from error
-            rows[line['verdict']].append(row)
-            right[line['verdict']].append(mark)
+            rows[answer].append(row)
+            right[answer].append(mark)
     if not any(right.values()):
         raise LgHuskyError('no outcome has the features of its confidence: they are of an '
-                           'earlier version, or all of before and after')
+                           'earlier version')
     found = {}
     for verdict, names in COEFFICIENTS.items():
         x = np.array(rows[verdict]).reshape(-1, len(names))

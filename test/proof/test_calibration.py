@@ -58,6 +58,22 @@ def test_names_that_gain_little_are_less_sure_if_they_are_wrong_oftener() -> Non
     assert calibrated(rows)['name_gain'][0] > 0.5
 
 
+def test_changes_have_coefficients_of_their_own() -> None:
+    """The less probable their gain is by chance, the oftener these are right."""
+    rng = np.random.default_rng(4)
+
+    def outcome(i: int, decades: float) -> dict[str, Any]:
+        right = bool(rng.uniform() < 1.0 / (1.0 + np.exp(0.5 + 0.4 * decades)))
+        return {**line(f'c{i}', right, gain=9.0, chance=10.0 ** decades), 'kind': 'before_after'}
+    found = calibrated([outcome(i, d) for i, d in enumerate(rng.uniform(-9.0, -2.0, 600))])
+    assert found['change_chance'][0] == pytest.approx(-0.4, abs=0.15)
+    assert found['change_constant'][1] == 600
+    assert found['name_constant'][1] == found['unchanged_constant'][1] == 0
+    same = {**line('same', True, gain=0.0, chance=0.5), 'kind': 'before_after',
+            'verdict': 'nothing_missing', 'said': [], 'true': [], 'level': 'clean'}
+    assert calibrated([same])['unchanged_constant'][1:] == (1, 1)
+
+
 def test_few_outcomes_do_not_make_certainty() -> None:
     features = {'gain': 1e4, 'share': 0.0, 'chance': 0.0}
     found = calibrated([line('a', True, **features)])

@@ -24,7 +24,8 @@ ROBOT: Final = (
     'grip_along', 'grip_across', 'creep_speed', 'creep_share', 'rolling', 'yaw_damping',
     'mass', 'yaw_inertia', 'com_x', 'com_y', 'com_height', 'radius_left', 'radius_right',
     'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak', 'reference_lag',
-    'drag', 'pull', 'scrub', 'scrub_speed', 'dead_voltage', 'bus_resistance', 'droop_rate')
+    'drag', 'pull', 'scrub', 'scrub_speed', 'dead_voltage', 'bus_resistance', 'droop_rate',
+    'windup')
 #: Numbers that are not estimated.
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
                 'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate', 'least_share',
@@ -42,6 +43,7 @@ ROWS: Final = len(ROBOT) + 51
  _V_MAX, _I_MAX, _INERTIA, _DRY, _, _VISCOUS, _, _MU_ALONG, _MU_ACROSS, _CREEP, _SHARE, _ROLLING,
  _YAW_DAMPING, _MASS, _TURNING, _COM_X, _COM_Y, _HEIGHT, _RADIUS, _, _SLOPE_X, _SLOPE_Y, _TRACK,
  _DEFLECTION, _LEAK, _LAG, _DRAG, _PULL, _SCRUB, _SCRUB_SPEED, _DEAD, _BUS_RESISTANCE, _DROOP,
+ _WINDUP,
  _V, _U, _R, _WHEEL, _, _SLOW_V, _SLOW_W, _ACC_X, _ACC_Y, _HELD, _,
  _ALONG, _, _, _, _ACROSS, _, _, _,
  _A00, _A02, _A11, _A12, _A22, _B0, _B1, _B2, _FRONT, _LEFT, _GX, _GY, _BUS,
@@ -83,14 +85,11 @@ def _begin(z: FloatArray, p: FloatArray, start: FloatArray, fixed: FloatArray, s
 
 
 @jit_part
-def _chassis(z: FloatArray, cosine: float, sine: float, command: FloatArray, k: int, step: float,
-             fixed: FloatArray) -> None:
+def _chassis(z: FloatArray, cosine: float, sine: float, step: float, fixed: FloatArray) -> None:
     # [m v, m u, jz r] before the tyres, whose secant slopes are added to the matrix.
     half, rolling_speed, gravity = 0.5 * fixed[0], fixed[6], fixed[7]
     least, scrub_rate, pull_speed = fixed[9], fixed[10], fixed[11]
     for j in range(z.shape[1]):
-        z[_SLOW_V, j] += z[_FOLLOW, j] * (command[k, 0, j] - z[_SLOW_V, j])
-        z[_SLOW_W, j] += z[_FOLLOW, j] * (command[k, 1, j] - z[_SLOW_W, j])
         gx = -(z[_SLOPE_X, j] * cosine + z[_SLOPE_Y, j] * sine)
         gy = -(-z[_SLOPE_X, j] * sine + z[_SLOPE_Y, j] * cosine)
         side = 0.5 * z[_TRACK, j]
@@ -117,10 +116,12 @@ def _chassis(z: FloatArray, cosine: float, sine: float, command: FloatArray, k: 
 
 
 @jit_part
-def _supply(z: FloatArray, k: int, step: float, fixed: FloatArray) -> None:
+def _supply(z: FloatArray, command: FloatArray, k: int, step: float, fixed: FloatArray) -> None:
     # What the loops ask for, both chopped from one supply, whose voltage their currents lower.
     resistance, emf, radius = fixed[1], fixed[2], fixed[3]
     for j in range(z.shape[1]):
+        z[_SLOW_V, j] += z[_FOLLOW, j] * (command[k, 0, j] - z[_SLOW_V, j])
+        z[_SLOW_W, j] += z[_FOLLOW, j] * (command[k, 1, j] - z[_SLOW_W, j])
         turn_width, slow_w, kff, kp = z[_TURN_WIDTH, j], z[_SLOW_W, j], z[_KFF, j], z[_KP, j]
         ahead, v_max = z[_SPEED_GAIN, j] * z[_SLOW_V, j], z[_V_MAX, j]
         w_left, w_right = z[_WHEEL, j], z[_WHEEL + 1, j]
@@ -214,8 +215,11 @@ def _driven_wheel(z: FloatArray, s: int, step: float, fixed: FloatArray) -> None
         given = volt_per_amp * bus * (clipped - lost)
         nw = (inertia / step * w + radius * z[_FIXED + s, j]) + (
             most if limited else (asked if free else given))
-        grown = held + z[_KI, j] * (wanted - w) * step
-        held = grown if free and not limited else held
+        # A loop does not integrate further into a limit of the voltage; of one of the current, it
+        # may not know.
+        share = z[_WINDUP, j] if limited else 1.0
+        grown = held + share * z[_KI, j] * (wanted - w) * step
+        held = grown if free or volts * (wanted - w) < 0.0 else held
         faded = held * z[_KEPT, j]
         z[_HELD + s, j] = faded if abs(wanted) < rest_rate else held
         # Wheel eliminated: w' = (nw + R a (v' - r' y)) / d.
@@ -323,7 +327,7 @@ def simulate(p: FloatArray, fixed: FloatArray, step: float, command: FloatArray,
     step : float
         [s].
     command : numpy.ndarray, shape (n, 2, n_lanes)
-        Mean of the accepted command in each step [m/s, rad/s].
+        Mean of the accepted command in each step [m/s, rad/s]; not read where `given`.
     level : numpy.ndarray, shape (n, 2)
         Cosine and sine of the heading; zeros where it is not known.
     wheels : numpy.ndarray, shape (n + 1, 2, n_lanes)
@@ -341,14 +345,14 @@ def simulate(p: FloatArray, fixed: FloatArray, step: float, command: FloatArray,
     _begin(z, p, start, fixed, step, out)
     _speeds(z, out, 0)
     for k in range(level.shape[0]):
-        _chassis(z, level[k, 0], level[k, 1], command, k, step, fixed)
+        _chassis(z, level[k, 0], level[k, 1], step, fixed)
         if given:
             _two_tyres(z, 0, fixed)
             _measured_wheel(z, 0, wheels, k)
             _two_tyres(z, 1, fixed)
             _measured_wheel(z, 1, wheels, k)
         else:
-            _supply(z, k, step, fixed)
+            _supply(z, command, k, step, fixed)
             _two_tyres(z, 0, fixed)
             _driven_wheel(z, 0, step, fixed)
             _two_tyres(z, 1, fixed)

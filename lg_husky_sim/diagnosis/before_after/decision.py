@@ -11,7 +11,6 @@ import math
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
 from lg_husky_sim.diagnosis.before_after.judge import is_beyond_chance
 from lg_husky_sim.diagnosis.before_after.settings import Change, Settings
-import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +27,15 @@ class Decision:
     tied : tuple of str
         Names that cannot be told from the one given, itself first; empty where it stands alone.
     confidence : float
+        How likely it is right, by a logistic function of what informs about it::
+
+            p = 1 / (1 + exp(-(c0 + c1 log10(chance))))
+
+        The margin to the next name is not used: where it is small, the names are tied.
     unknown : float
         Gain of letting everything differ where something changed that has no name [nats]; else 0.
     chance : float
-        Of what is claimed, on a robot that has not changed; NaN where nothing changed.
+        Of what is claimed, or gains most where nothing is, on a robot that has not changed.
     """
 
     named: Candidate | None
@@ -39,7 +43,12 @@ class Decision:
     tied: tuple[str, ...]
     confidence: float
     unknown: float = 0.0
-    chance: float = float('nan')
+    chance: float = 1.0
+
+    @property
+    def features(self) -> dict[str, float]:
+        """What the confidence is made of."""
+        return {'gain': self.gain, 'chance': self.chance}
 
     @property
     def gain(self) -> float:
@@ -123,10 +132,8 @@ def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
         return _claimed(named, bodily if named in bodily else loop.candidates, settings, numbers)
     everything = sorted((*bodily, *loop.candidates), key=lambda one: -one.gain)
     least = min((one.chance for one in everything if one.gain > 0.0), default=1.0)
-    doubt = numbers['sure_doubt'] * min(float(
-        np.log(max(least, 1e-300)) / np.log(numbers['false_alarm_rate'])), 1.0)
     return Decision(None, _best_of_names(everything, ''), (),
-                    _bounded(numbers['sure_nothing'] - doubt, numbers))
+                    _likely('unchanged', least, numbers), chance=least)
 
 
 def claim(change: Change, body: Block | None, loop: Block, settings: Settings) -> Decision | None:
@@ -166,10 +173,8 @@ def unnamed(body: Block | None, loop: Block, explained: float, settings: Setting
         return None
     everything = sorted((one for block in blocks for one in block.candidates),
                         key=lambda one: -one.gain)
-    margin = 1.0 - explained / surest.anything
     return Decision(None, _best_of_names(everything, ''), (),
-                    _bounded(_odds(surest.chance, margin, numbers), numbers),
-                    surest.anything, surest.chance)
+                    _likely('change', surest.chance, numbers), surest.anything, surest.chance)
 
 
 def _shared(body: Block | None, settings: Settings) -> dict[str, float]:
@@ -181,22 +186,12 @@ def _shared(body: Block | None, settings: Settings) -> dict[str, float]:
 def _claimed(named: Candidate, block: Sequence[Candidate], settings: Settings,
              numbers: Mapping[str, float]) -> Decision:
     rivals = _best_of_names(block, named.change.effect)
-    second = max(rivals[0].gain, 0.0) if rivals else 0.0
-    margin = float(np.clip(1.0 - second / named.gain, 0.0, 1.0))
     alike = [one.change.effect for one in rivals if is_beyond_chance(one, numbers) and (
         named.gain - one.gain < max(numbers['tie'], numbers['near'] * named.gain))]
     alike += settings.aliases.get(named.change.effect, ())
     tied = (named.change.effect, *dict.fromkeys(alike)) if alike else ()
-    return Decision(named, rivals, tied,
-                    _bounded(_odds(named.chance, margin, numbers), numbers),
+    return Decision(named, rivals, tied, _likely('change', named.chance, numbers),
                     chance=named.chance)
-
-
-def _odds(chance: float, margin: float, numbers: Mapping[str, float]) -> float:
-    # Log odds of a claim.
-    beyond = float(np.log(numbers['false_alarm_rate'] / max(chance, 1e-300)))
-    return (numbers['sure_offset'] + numbers['sure_margin'] * margin
-            + numbers['sure_gain'] * beyond)
 
 
 def _best_of_names(candidates: Sequence[Candidate], but: str) -> tuple[Candidate, ...]:
@@ -207,5 +202,8 @@ def _best_of_names(candidates: Sequence[Candidate], but: str) -> tuple[Candidate
     return tuple(found.values())
 
 
-def _bounded(odds: float, numbers: Mapping[str, float]) -> float:
-    return float(np.clip(1.0 / (1.0 + np.exp(-odds)), numbers['least'], numbers['most']))
+def _likely(answer: str, chance: float, numbers: Mapping[str, float]) -> float:
+    # What is less than the least chance is told apart by nobody.
+    odds = numbers[f'{answer}_constant'] + numbers[f'{answer}_chance'] * math.log10(
+        max(chance, numbers['least_chance']))
+    return 1.0 / (1.0 + math.exp(-odds))

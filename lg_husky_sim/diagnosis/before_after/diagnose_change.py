@@ -180,7 +180,7 @@ def _diagnosis(selection: Selection, after: Sequence[Drive], earlier: Sequence[S
         found, not_told_apart(selection.decisions, known),
         mismatches(shown or loop, after, first, known), (),
         _errors(plain, later), _errors(model, later), _errors(plain, test), _errors(half, test),
-        _remaining(first), model, plain, tuple(notes))
+        _remaining(first), model, plain, tuple(notes), first.features)
 
 
 def _errors(model: ModelFile, parts: Sequence[Segment]) -> dict[str, float]:

@@ -62,6 +62,15 @@ class Quadratic:
         return replace(self, curvature=curvature, slope=slope,
                        cost=self.cost + 0.5 * more * at ** 2)
 
+    def flatter(self, k: int, by: float) -> Quadratic:
+        """Return this with so many times the curvature along a parameter, about its place."""
+        at, scale = self.place, np.ones(self.place.size)
+        scale[k] = np.sqrt(by)
+        curvature = scale[:, None] * self.curvature * scale
+        slope = curvature @ at - scale * (self.curvature @ at - self.slope)
+        return replace(self, curvature=curvature, slope=slope,
+                       cost=self.value(at) - float(0.5 * at @ curvature @ at - slope @ at))
+
     def varying(self, sd: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Return curvature, slope and log evidence with the recording's own deviation."""
         inner = sd[:, None] * self.curvature * sd

@@ -15,9 +15,11 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.before_after.base import Base
+from lg_husky_sim.diagnosis.before_after.dispersion import dispersed
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, joined, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import costs_at, fit_set, Prior, SetFit
+from lg_husky_sim.diagnosis.before_after.limits import with_limits
 from lg_husky_sim.diagnosis.before_after.prediction import (
     CHANNELS,
     jacobian,
@@ -90,8 +92,8 @@ class RecordingFits:
                 key=lambda fit: fit.cost).z
         ends = pool.map(end, expected)
         places = {**self.places, **dict(zip(expected, ends, strict=True))}
-        found = {one.recording: _with_limits(base, groups[one.recording], self.noise, self.prior,
-                                             places, one)
+        found = {one.recording: with_limits(base, groups[one.recording], self.noise, self.prior,
+                                            places, one)
                  for one in _quadratics(base, {name: groups[name] for name in expected},
                                         self.noise, self.prior, places, pool)}
         return replace(self, places=places, quadratics=tuple(
@@ -138,7 +140,8 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
     groups = _by_recording(drives)
     places, noise, prior = _alone(base, prior, wide, groups, lags, begin, pool, share)
     every = replace(every, mean=prior.mean)
-    about = _deviations(base, prior, wide, places, [
+    about = _deviations(base, prior, wide, {
+        name: place - lags[name] for name, place in places.items()}, [
         q.less(lags[q.recording])
         for q in _quadratics(base, groups, noise, prior, places, pool)])
 
@@ -155,7 +158,7 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
     found = _quadratics(base, groups, noise, every, ended, pool)
     share(1.0)
     return RecordingFits(base, every, noise, about.mean, ended, tuple(
-        _with_limits(base, groups[one.recording], noise, every, ended, one) for one in found),
+        with_limits(base, groups[one.recording], noise, every, ended, one) for one in found),
         tuple(drives))
 
 
@@ -178,19 +181,19 @@ def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequ
     first, prior = firsts[best].z, kinds[best][1]
     share(0.2)
 
-    def fitted(name: str, about: Prior, kinds: Sequence[Sequence[FloatArray]], until: float
-               ) -> SetFit:
+    def fitted(name: str, about: Prior, kinds: Sequence[Sequence[FloatArray]], until: float,
+               most: str = 'raced') -> SetFit:
         return _raced(base, groups[name], replace(about, mean=about.mean + lags[name]), noise,
-                      kinds, until)
+                      kinds, until, most)
     options = [*(start for start, _ in kinds),
                *_shifted(base, prior.free, first - lags[longest])]
     places = dict(zip(names, pool.map(lambda name: first if name == longest else fitted(
         name, prior, [[one + lags[name]] for one in options], roughly).z, names), strict=True))
     share(0.4)
-    noise = _renewed(base, groups, places).among(noise.sd)
+    noise = _renewed(base, groups, places, replace(prior, sd=wide), noise, pool)
     for turn, until in enumerate((roughly, enough)):
-        middle = _mean(base, prior, wide, places, [q.less(lags[q.recording]) for q in _quadratics(
-            base, groups, noise, prior, places, pool)])
+        middle = _middle(base, prior, wide, {
+            name: place - lags[name] for name, place in places.items()})
         about = Prior(middle, wide, prior.free)
         ends = {'': middle, **{name: place - lags[name] for name, place in places.items()}}
 
@@ -201,29 +204,33 @@ def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequ
             others = [[one] for one in begins] if turn else list(zip(
                 *(_shifted(base, prior.free, one) for one in begins), strict=True))
             fits = [fitted(name, about, [[places[name]]], until),
-                    fitted(name, about, others, until)]
+                    fitted(name, about, others, until, 'raced' if turn else 'raced_first')]
             return min(fits, key=lambda fit: fit.cost).z
         places = dict(zip(names, pool.map(again, names), strict=True))
         share(0.6 + 0.15 * turn)
         if not turn:
-            noise = _renewed(base, groups, places).among(noise.sd)
+            noise = _renewed(base, groups, places, about, noise, pool)
     return places, noise, prior
 
 
 def _raced(base: Base, drives: Sequence[Drive], about: Prior, noise: Noise,
-           kinds: Sequence[Sequence[FloatArray]], until: float) -> SetFit:
-    # From the likeliest start of each kind, of the best few of which one goes on: by halving.
+           kinds: Sequence[Sequence[FloatArray]], until: float, most: str = 'raced') -> SetFit:
+    # From the likeliest start of each kind, of the best few of which one goes on: by halving. Of
+    # those that are as likely as another, as a limit that is not reached is, that one is enough.
     numbers = base.settings.fit
 
     def fit(start: FloatArray, at_most: int) -> SetFit:
         return fit_set(base, drives, about, noise, start, at_most, until, map)
     costs = iter(costs_at(base, drives, about, noise, [
         one for kind in kinds for one in kind], map))
-    likeliest = [min(((next(costs), k, one) for k, one in enumerate(kind)),
-                     key=lambda one: one[:2]) for kind in kinds]
-    nearest = sorted(((cost, k, one) for k, (cost, _, one) in enumerate(likeliest)),
-                     key=lambda one: one[:2])[:int(numbers['raced'])]
-    alive = [one for _, _, one in nearest]
+    each = [[(next(costs), k, one) for one in kind] for k, kind in enumerate(kinds)]
+    likeliest = [min(kind, key=lambda one: one[0]) for kind in each]
+    alive: list[FloatArray] = []
+    last = -np.inf
+    for cost, _, one in sorted(likeliest, key=lambda one: one[:2]):
+        if len(alive) < int(numbers[most]) and cost > last + numbers['enough']:
+            alive.append(one)
+            last = cost
     while len(alive) > 1:
         fits = sorted((fit(one, int(numbers['race_steps'])) for one in alive),
                       key=lambda one: one.cost)
@@ -299,9 +306,12 @@ def _shifted(base: Base, free: NDArray[np.bool_], begin: FloatArray) -> list[Flo
     return found
 
 
-def _renewed(base: Base, groups: Mapping[str, Sequence[Drive]], places: Places) -> Noise:
-    return noise_of([residual(base, d, places[name]) for name, ds in groups.items() for d in ds],
-                    int(base.settings.fit['filter']))
+def _renewed(base: Base, groups: Mapping[str, Sequence[Drive]], places: Places, prior: Prior,
+             of: Noise, pool: Executor) -> Noise:
+    # That of the residuals where each recording was fitted, in the channels of another one.
+    noise = noise_of([residual(base, d, places[name]) for name, ds in groups.items() for d in ds],
+                     int(base.settings.fit['filter'])).among(of.sd)
+    return dispersed(base, groups, places, noise, prior, pool)
 
 
 def _quadratics(base: Base, groups: Mapping[str, Sequence[Drive]], noise: Noise, prior: Prior,
@@ -328,38 +338,18 @@ def _deviations(base: Base, prior: Prior, wide: FloatArray, places: Places,
     for k, quantity in enumerate(quantities):
         if quantity.name in base.settings.limits or k == base.reference:
             sd[k] = wide[k]
-    return Prior(_mean(base, prior, sd, places, quadratics), sd, prior.free)
+    return Prior(_middle(base, prior, sd, places), sd, prior.free)
 
 
-def _mean(base: Base, prior: Prior, wide: FloatArray, places: Places,
-          quadratics: Sequence[Quadratic]) -> FloatArray:
-    # A limit is the highest of all recordings: where none is reached, none is told.
-    index = np.flatnonzero(prior.free)
+def _middle(base: Base, prior: Prior, wide: FloatArray, places: Places) -> FloatArray:
+    # The likeliest mean of recordings that are where they are. What all of them together say by
+    # their derivatives would outweigh the prior of what is nearly free, and lead it far away.
+    several = np.array(list(places.values()))
     z = np.array(prior.mean)
-    z[index] = Evidence([q.among(index) for q in quadratics], prior.mean[index], prior.sd[index],
-                        wide[index], wide[index]).solve(np.zeros(0, dtype=np.intp)).shared
     for k, quantity in enumerate(base.settings.quantities):
-        if prior.free[k] and quantity.name in base.settings.limits:
-            z[k] = max(place[k] for place in places.values())
+        if prior.free[k]:
+            known, each = prior.sd[k] ** -2, wide[k] ** -2
+            z[k] = (known * z[k] + each * several[:, k].sum()) / (known + each * len(several))
+            if quantity.name in base.settings.limits:
+                z[k] = several[:, k].max()
     return np.clip(z, *base.bounds())
-
-
-def _with_limits(base: Base, drives: Sequence[Drive], noise: Noise, prior: Prior, places: Places,
-                 near: Quadratic) -> Quadratic:
-    # A limit that is not reached has no derivative: put the lowest of all recordings in.
-    z = places[near.recording]
-
-    def cost(at: FloatArray) -> float:
-        return 0.5 * sum(float(e @ e) for e in (
-            noise.white(residual(base, d, at)) for d in drives))
-    here = near.value(z)
-    for k, quantity in enumerate(base.settings.quantities):
-        lowest = min(place[k] for place in places.values())
-        apart = float(lowest - z[k])
-        if not prior.free[k] or quantity.name not in base.settings.limits or (
-                abs(apart) < prior.sd[k] * base.settings.fit['limit_apart']):
-            continue
-        there = np.array(z)
-        there[k] = lowest
-        near = near.curved(k, z[k], 2.0 * (cost(there) - here) / apart ** 2)
-    return near

@@ -31,15 +31,18 @@ class Noise:
 
     def white(self, rows: Mapping[str, FloatArray]) -> FloatArray:
         """Return residuals, or their derivatives, whitened and stacked along the first axis."""
-        parts = []
-        for stream, names in CHANNELS.items():
-            if stream not in rows:
-                continue
-            for k, name in enumerate(names):
-                if name not in self.sd:
-                    continue
-                parts.append(self._one(name, rows[stream][:, k]))
-        return np.concatenate(parts)
+        return np.concatenate(list(self.by_channel(rows).values()))
+
+    def by_channel(self, rows: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return residuals, or their derivatives, whitened, by channel."""
+        return {name: self._one(name, rows[stream][:, k])
+                for stream, names in CHANNELS.items() if stream in rows
+                for k, name in enumerate(names) if name in self.sd}
+
+    def wider(self, by: Mapping[str, float]) -> Noise:
+        """Return this with standard deviations that are so many times as large."""
+        return Noise(self.filters, {
+            name: by.get(name, 1.0) * size for name, size in self.sd.items()})
 
     def among(self, names: Collection[str]) -> Noise:
         """Return this for channels of these names only; the others do not count."""

@@ -5,6 +5,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import os
+from pathlib import Path
+import subprocess
+import sys
 
 from lg_husky_sim.diagnosis.before_after.base import Base, base_of
 from lg_husky_sim.diagnosis.before_after.drives import Drive, drives
@@ -14,6 +18,7 @@ from lg_husky_sim.diagnosis.before_after.prediction import jacobian, predicted, 
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
 from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.jit import compiled, SWITCH
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
@@ -57,6 +62,14 @@ def places(of: Base, count: int) -> list[FloatArray]:
     rng, lower, upper = np.random.default_rng(count), *of.bounds()
     return [np.clip(of.start + 0.2 * of.sd * rng.standard_normal(of.sd.size), lower, upper)
             for _ in range(count)]
+
+
+def motions() -> FloatArray:
+    """Return what a robot alone and two do, at the measured wheel rates and by the loop."""
+    one = drive()
+    return np.array([moved(base(given), one, np.array([base().values(z) for z in places(
+        base(), count)]))[..., :count].sum(axis=(0, 2)) for given in (True, False)
+        for count in (1, 2)])
 
 
 @pytest.mark.parametrize('given', [False, True])
@@ -112,6 +125,21 @@ def test_what_is_only_read_otherwise_shares_a_motion() -> None:
     for k, robot in enumerate(robots):
         own = predicted(of, one, robot[None], moved(of, one, robot[None]))
         assert all(np.array_equal(shared[name][..., k], own[name][..., 0]) for name in own)
+
+
+@pytest.mark.skipif(not compiled(), reason='numba is not installed: there is one kernel only')
+def test_plain_python_does_the_same_and_reads_nothing_beyond_the_arrays(tmp_path: Path) -> None:
+    """Machine code would read whatever memory is there."""
+    script = f"""
+import sys
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+import numpy as np
+from test_several_robots import motions
+np.save({str(tmp_path / 'plain.npy')!r}, motions())
+"""
+    subprocess.run([sys.executable, '-c', script], check=True, timeout=120,
+                   env={**os.environ, SWITCH: '1'})
+    np.testing.assert_array_equal(np.load(tmp_path / 'plain.npy'), motions())
 
 
 def test_memory_is_used_again_and_grows() -> None:

@@ -1,0 +1,80 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Likelihoods of limits, which no derivative at one place tells.
+
+A limit that a recording does not reach has no derivative there, and where one just bites, the
+likelihood is steep beside it and level beyond.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from lg_husky_sim.diagnosis.before_after.base import Base
+from lg_husky_sim.diagnosis.before_after.drives import Drive
+from lg_husky_sim.diagnosis.before_after.evidence import Quadratic
+from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
+from lg_husky_sim.diagnosis.before_after.prediction import residual
+from lg_husky_sim.diagnosis.before_after.whitening import Noise
+from lg_husky_sim.signals import FloatArray
+import numpy as np
+
+
+def with_limits(base: Base, drives: Sequence[Drive], noise: Noise, prior: Prior,
+                places: Mapping[str, FloatArray], near: Quadratic) -> Quadratic:
+    """
+    Return the quadratic of a recording with what the limits of the others would cost it.
+
+    Where the lowest limit of all recordings, in place of its own, costs more than the derivatives
+    say, the curvature is as large as that. The highest one costs no more than none at all, with
+    all else as far from its place as recordings of one robot differ.
+
+    Parameters
+    ----------
+    base : Base
+    drives : sequence of Drive
+        Of the recording.
+    noise : Noise
+    prior : Prior
+        Whose free parameters count.
+    places : mapping of str to numpy.ndarray, shape (n,)
+        Where each recording was fitted, on the scale of the estimates.
+    near : Quadratic
+        Of the recording, about its place.
+
+    Returns
+    -------
+    Quadratic
+    """
+    numbers, quantities = base.settings.fit, base.settings.quantities
+    z, several = places[near.recording], np.array(list(places.values()))
+    wide = np.hypot([q.recording for q in quantities], numbers['drawn_least'] * prior.sd)
+
+    def cost(at: FloatArray) -> float:
+        return 0.5 * sum(float(e @ e) for e in (
+            noise.white(residual(base, d, at)) for d in drives))
+    here, upper = near.value(z), base.bounds()[1]
+    for k, quantity in enumerate(quantities):
+        if not prior.free[k] or quantity.name not in base.settings.limits:
+            continue
+        lower, higher = several[:, k].min() - z[k], several[:, k].max() - z[k]
+        if -lower > prior.sd[k] * numbers['limit_apart']:
+            there = np.where(np.arange(z.size) == k, z[k] + lower, z)
+            near = near.curved(k, z[k], 2.0 * (cost(there) - here) / lower ** 2)
+        others = prior.free & (np.arange(z.size) != k)
+        promised = 0.5 * _profile(near.curvature, k, others, wide) * higher ** 2
+        if promised > numbers['enough']:
+            about = Prior(np.where(others | ~prior.free, z, upper), wide, others)
+            fit = fit_set(base, drives, about, noise, about.mean, int(numbers['steps']),
+                          numbers['enough'], map)
+            near = near.flatter(k, float(np.clip((fit.cost - here) / promised, 0.0, 1.0)))
+    return near
+
+
+def _profile(curvature: FloatArray, k: int, others: np.typing.NDArray[np.bool_], wide: FloatArray
+             ) -> float:
+    # Curvature along a parameter with the others, of so wide a prior, at their best.
+    inner = curvature[np.ix_(others, others)] + np.diag(wide[others] ** -2.0)
+    across = curvature[others, k]
+    return float(curvature[k, k] - across @ np.linalg.solve(inner, across))
