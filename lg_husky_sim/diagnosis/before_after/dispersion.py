@@ -91,6 +91,6 @@ def _scatter(base: Base, drives: Sequence[Drive], z: FloatArray, noise: Noise, p
         if len(every) > 1:
             off = every - every.mean(axis=0)
             share = len(every) / (len(every) - 1.0)
-            found[name] = (share * float(np.einsum('bi,ij,bj->', off, known, off)),
+            found[name] = (share * float(np.sum(off @ known * off)),
                            float(np.sum(known * grams[name])))
     return found

@@ -176,8 +176,8 @@ class Evidence:
                 spread = np.linalg.inv(inner)
                 move = spread @ left @ level
                 deviation = spread @ (sd * one.slope) - move @ at
-                squares += deviation ** 2 + np.diag(spread) + np.einsum(
-                    'ij,jk,ik->i', move, covariance, move)
+                squares += deviation ** 2 + np.diag(spread) + np.sum(
+                    move @ covariance * move, axis=1)
             found = replace(found, recording_sd=np.minimum(most, np.sqrt(
                 (weight * self.recording_sd ** 2 + sd ** 2 * squares)
                 / (weight + len(self.quadratics)))))
