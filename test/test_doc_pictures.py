@@ -23,6 +23,8 @@ PICTURES = DOCS / 'pictures'
 #: Side of the blocks whose means are compared [pixels], and the largest difference in grey
 #: levels of 255: letters of another version of matplotlib move by a pixel, bars by more.
 BLOCK, ALIKE = 16, 30.0
+#: Files of outcomes that the page of the blind trial is made of.
+OUTCOMES = ('proof_report', 'proof_exam', 'proof_validation')
 
 
 def blocks(path: Path) -> FloatArray:
@@ -57,7 +59,7 @@ def proof(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Make the page of the blind trial from its outcomes, as it says itself."""
     folder = tmp_path_factory.mktemp('proof') / 'docs'
     folder.mkdir()
-    sources = [folder / name for name in ('proof_report.jsonl', 'proof_validation.jsonl')]
+    sources = [folder / f'{name}.jsonl' for name in OUTCOMES]
     for source in sources:
         shutil.copy(DOCS / source.name, source)
     result = CliRunner().invoke(cli, ['prove', *(word for source in sources
@@ -69,7 +71,7 @@ def proof(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_page_of_the_blind_trial_is_that_of_its_outcomes(proof: Path) -> None:
     made = (proof / 'proof.md').read_text(encoding='utf-8')
-    for name in ('proof_report', 'proof_validation'):
+    for name in OUTCOMES:
         made = made.replace((proof / name).as_posix(), f'docs/{name}')
     assert (DOCS / 'proof.md').read_text(encoding='utf-8') == made
 

@@ -203,7 +203,8 @@ def _section(title: str, results: Json, trials: Sequence[Json], full: bool) -> l
     return parts
 
 
-TITLES = {'report': 'Reported trial', 'tuning': 'Tuning trial (seen while tuning: no proof)',
+TITLES = {'report': 'Reported trial', 'exam': 'Exam by another generator, sat once',
+          'tuning': 'Tuning trial (seen while tuning: no proof)',
           'validation': 'Validation cases of another author (tuning data: no proof)'}
 
 
@@ -215,7 +216,7 @@ def page_of(sections: Mapping[str, tuple[Json, Sequence[Json]]], sources: Sequen
     Parameters
     ----------
     sections
-        By set ('report', 'tuning', 'validation'): its figures (`summary.summarise`) and
+        By set ('report', 'exam', 'tuning', 'validation'): its figures (`summary.summarise`) and
         the facts of its trials.
     sources
         Files of outcomes, as the reader of the page finds them.
