@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 @jit
 def mean_in_bins(rows: FloatArray, first: int, start: float, step: float, times: FloatArray,
-                 edges: NDArray[np.intp], later: float, out: FloatArray) -> None:
+                 edges: NDArray[np.intp], later: float, goes_on: bool, out: FloatArray) -> None:
     """
     Read rows at the stamps of samples, and average these in bins.
 
@@ -30,6 +30,9 @@ def mean_in_bins(rows: FloatArray, first: int, start: float, step: float, times:
         First sample of each bin.
     later : float
         What is added to the stamps [s].
+    goes_on : bool
+        Before the first row and after the last one, rows change as beside them: a wheel turns on,
+        and has not stopped where the simulation ends. Else they are those at the end.
     out : numpy.ndarray, shape (n_bins, k, n_lanes)
         Receives the means.
     """
@@ -41,8 +44,10 @@ def mean_in_bins(rows: FloatArray, first: int, start: float, step: float, times:
             for j in range(out.shape[2]):
                 out[b, c, j] = 0.0
         for i in range(begin, end):
-            place = min(max((times[i] + later - start) / step, 0.0), last)
-            index = int(place)
+            place = (times[i] + later - start) / step
+            if not goes_on:
+                place = min(max(place, 0.0), last)
+            index = min(max(int(place), 0), rows.shape[0] - 2)
             share = place - index
             for c in range(out.shape[1]):
                 for j in range(out.shape[2]):

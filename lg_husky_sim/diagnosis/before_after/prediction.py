@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 #: the middle between them.
 CHANNELS = {'wheels': ('left', 'right'), 'imu': ('yaw', 'accel_x', 'accel_y'),
             'pose': ('ahead', 'aside', 'turn')}
+#: First of the outputs that go on where a simulation ends, as rates do not.
+PLACES = ('x', 'angle_left')
 #: Their kinds in ``config/before_after.yaml``.
 KINDS = {'left': 'wheels', 'right': 'wheels', 'yaw': 'yaw', 'accel_x': 'accel',
          'accel_y': 'accel', 'ahead': 'place', 'aside': 'place', 'turn': 'heading'}
@@ -33,7 +35,7 @@ def _read(base: Base, drive: Drive, stream: str, motion: FloatArray, first: str,
     found = np.empty((times.size, bins.edges.size, OUTPUTS.index(last) + 1 - begin, lanes))
     for one, out in zip(times, found, strict=True):
         mean_in_bins(motion, begin, drive.start, base.settings.simulation['step'], bins.times,
-                     bins.edges, one, out)
+                     bins.edges, one, first in PLACES, out)
     lane = np.minimum(np.arange(later.size), lanes - 1)
     return np.moveaxis(found[which, :, :, lane], 0, -1)
 
