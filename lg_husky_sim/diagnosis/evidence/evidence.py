@@ -31,6 +31,7 @@ from lg_husky_sim.diagnosis.evidence.noise import (
 )
 from lg_husky_sim.diagnosis.evidence.observation import Motion, observe, simulate
 from lg_husky_sim.diagnosis.evidence.point import Point
+from lg_husky_sim.diagnosis.evidence.products import normal_matrix
 from lg_husky_sim.diagnosis.evidence.repaired_commands import repaired
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
@@ -188,7 +189,7 @@ class Evidence:
                     old[:, which] = new
                 rows = self.whiten(raw) / inflation
             weight = (nu + 1.0) / (nu + whitened * whitened)
-            normal = (rows * weight[:, None]).T @ rows + np.diag(point.weights ** 2)
+            normal = normal_matrix(rows, weight) + np.diag(point.weights ** 2)
             slope = rows.T @ (weight * whitened) - point.weights * point.prior_residuals
             scale = np.diag(normal) + 1e-12
             before, fell, hoped = cost, False, 1.0

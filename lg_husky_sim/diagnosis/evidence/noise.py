@@ -253,29 +253,43 @@ def fit_noise(start: Noise, frames: Sequence[Frame], models: Sequence[FloatArray
             ((place - centre) / spread) ** 2))
         return cost, e, np.log(s)
 
+    def weighed(e: FloatArray, moved: FloatArray, ds: FloatArray) -> tuple[FloatArray, FloatArray]:
+        # Of innovations e/S^(1/2): information 2 (d ln s)^2 + (d (e s)/s)^2.
+        fisher = 2.0 * ds.T @ ds + moved.T @ moved + np.diag(spread ** -2.0)
+        slope = (nu + 1.0) * e / (nu + e * e)
+        gradient = (slope @ moved + (1.0 - slope * e) @ ds + (place - centre) / spread ** 2)
+        # A forward difference carries half of the curvature of its own step.
+        return fisher, gradient - 0.5 * step * np.diag(fisher)
+
     place = np.clip(np.log([start.values[n] for n in NAMES]), lower, upper)
     cost, e, logs = run(place)
-    damping = 1e-3
+    damping, nu, least = 1e-3, setting('student'), setting('noise_converged')
     for _ in range(rounds):
         shifted = list(pool.map(run, [place + step * row for row in np.eye(place.size)]))
-        gradient = np.array([(one[0] - cost) / step for one in shifted])
-        de = np.column_stack([(one[1] - e) / step for one in shifted])
         ds = np.column_stack([(one[2] - logs) / step for one in shifted])
-        # Of innovations e/S^(1/2): information 2 (d ln s)^2 + (d (e s)/s)^2.
-        moved = de + e[:, None] * ds
-        fisher = 2.0 * ds.T @ ds + moved.T @ moved + np.diag(spread ** -2.0)
-        # A forward difference carries half of the curvature of its own step.
-        gradient = gradient - 0.5 * step * np.diag(fisher)
-        before = cost
-        for _ in range(6):
-            move = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)), -gradient)
-            tried = np.clip(place + np.clip(move, -1.5, 1.5), lower, upper)
-            new = run(tried)
-            if new[0] < cost:
-                place, (cost, e, logs) = tried, new
-                damping = max(damping * 0.3, 1e-4)
+        moved = np.column_stack([(one[1] - e) / step for one in shifted]) + e[:, None] * ds
+        gained, first = math.inf, None
+        # Derivatives are kept while they foretell what a step gains.
+        while gained > least:
+            fisher, gradient = weighed(e, moved, ds)
+            before, hoped = cost, 0.0
+            for _ in range(6):
+                move = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)), -gradient)
+                tried = np.clip(place + np.clip(move, -1.5, 1.5), lower, upper)
+                new = run(tried)
+                if new[0] < cost:
+                    move = tried - place
+                    hoped = -float(gradient @ move + 0.5 * move @ fisher @ move)
+                    place, (cost, e, logs) = tried, new
+                    damping = max(damping * 0.3, 1e-4)
+                    break
+                damping = max(damping, 1e-3) * 8.0
+                if first is not None:
+                    break
+            gained = before - cost
+            first = gained if first is None else first
+            if gained < setting('trusted_slopes') * hoped:
                 break
-            damping = max(damping, 1e-3) * 8.0
-        if before - cost < setting('noise_converged'):
+        if first is None or first < least:
             break
     return Noise(dict(zip(NAMES, np.exp(place).tolist(), strict=True)))

@@ -16,6 +16,7 @@ import math
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
+from lg_husky_sim.diagnosis.evidence.products import normal_matrix
 from lg_husky_sim.diagnosis.evidence.reading import imu_lag, Reading, wheel_lag, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import window_unknown
 from lg_husky_sim.diagnosis.settings import setting
@@ -76,7 +77,7 @@ def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
     def promise(point: Point) -> float:
         e = evidence.residuals(evidence.predict(point))
         weight = (nu + 1.0) / (nu + e * e)
-        normal = (fit.jacobian * weight[:, None]).T @ fit.jacobian + np.diag(point.weights ** 2)
+        normal = normal_matrix(fit.jacobian, weight) + np.diag(point.weights ** 2)
         slope = fit.jacobian.T @ (weight * e) - point.weights * point.prior_residuals
         # A number that acts nowhere, of an effect without a prior, may leave it singular.
         move = np.linalg.lstsq(normal, slope, rcond=None)[0]

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import math
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.products import normal_matrix, row_slices
 from lg_husky_sim.diagnosis.evidence.unknowns import NEUTRAL
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     Hypothesis,
@@ -46,12 +47,6 @@ class Look:
     hypothesis: Hypothesis
     numbers: Numbers
     gain: float
-
-
-def _slices(count: int) -> list[slice]:
-    # Rows of columns that are worked on together.
-    rows = int(setting('row_batch'))
-    return [slice(first, first + rows) for first in range(0, count, rows)]
 
 
 class Projection:
@@ -91,15 +86,13 @@ class Projection:
         slope : numpy.ndarray, shape (m,)
         """
         explained = self._base @ columns
-        normal = -explained.T @ explained
-        for some in _slices(len(columns)):
-            normal += columns[some].T @ (columns[some] * self._weights[some, None])
-        return normal, self._target @ columns
+        return (normal_matrix(columns, self._weights) - explained.T @ explained,
+                self._target @ columns)
 
     def apart(self, columns: FloatArray) -> FloatArray:
         """Return what is left of the columns themselves, shape (n, m)."""
         explained, found = self._base @ columns, np.array(columns)
-        for some in _slices(len(columns)):
+        for some in row_slices(len(columns)):
             found[some] -= (self._base.T[some] / self._weights[some, None]) @ explained
         return found
 
@@ -120,17 +113,23 @@ class Projection:
         slope : numpy.ndarray, shape (m, size)
         """
         count = columns.shape[1] // size
-        explained = (self._base @ columns).reshape(-1, size, count)
-        slope = (self._target @ columns).reshape(size, count).T
-        weighted = (columns * self._weights[:, None]).reshape(-1, size, count)
-        whole = columns.reshape(-1, size, count)
-        normal = np.empty((count, size, size))
+        explained = np.zeros((len(self._base), columns.shape[1]))
+        slope, normal = np.zeros(columns.shape[1]), np.zeros((size, size, count))
+        for some in row_slices(len(columns)):
+            own = columns[some]
+            explained += self._base[:, some] @ own
+            slope += self._target[some] @ own
+            weighted = (own * self._weights[some, None]).reshape(-1, size, count)
+            whole = own.reshape(-1, size, count)
+            for i in range(size):
+                for j in range(i + 1):
+                    normal[i, j] += np.einsum('nm,nm->m', weighted[:, i], whole[:, j])
+        done = explained.reshape(-1, size, count)
         for i in range(size):
             for j in range(i + 1):
-                normal[:, i, j] = normal[:, j, i] = (
-                    np.einsum('nm,nm->m', weighted[:, i], whole[:, j])
-                    - np.einsum('km,km->m', explained[:, i], explained[:, j]))
-        return normal, slope
+                normal[i, j] -= np.einsum('km,km->m', done[:, i], done[:, j])
+                normal[j, i] = normal[i, j]
+        return normal.transpose(2, 0, 1), slope.reshape(size, count).T
 
 
 def gain_of(normal: FloatArray, slope: FloatArray, limits: Sequence[tuple[float, float]]
