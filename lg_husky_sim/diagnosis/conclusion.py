@@ -12,10 +12,11 @@ from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
 from lg_husky_sim.diagnosis.decision.confidence import confidence, Features
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
+from lg_husky_sim.diagnosis.evidence.products import normal_matrix
 from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import neutral_of
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, Effort
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, Effort, efforts
 from lg_husky_sim.diagnosis.localisation import Missing, where_it_shows
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
 from lg_husky_sim.diagnosis.selection.rounds import is_negligible, Round
@@ -72,7 +73,7 @@ def _intervals(fit: Fit) -> list[tuple[Unknown, float, float]]:
     # Each number of the robot or an effect with its place and half of its 95 % interval there.
     nu = setting('student')
     weight = (nu + 1.0) / (nu + fit.whitened ** 2)
-    normal = (fit.jacobian * weight[:, None]).T @ fit.jacobian + np.diag(
+    normal = normal_matrix(fit.jacobian, weight) + np.diag(
         fit.point.weights ** 2)
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
     covariance = np.linalg.pinv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
@@ -286,10 +287,26 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     best = tried[0]
     second = max((t.score for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id
                   and not is_negligible(t, first.evidence.noise.values)), default=0.0)
+    told = max(explained_by(search), best.gain)
     features = Features(best.gain, 1.0 - max(second, 0.0) / max(best.score, 1e-9),
-                        explained / max(explained_by(search), best.gain), first.chance)
-    is_unknown = is_left and features.share > setting('unknown_share')
+                        explained / told, first.chance)
+    is_unknown = is_left and features.share > setting('unknown_share') and not (
+        _is_its_form(search, rest, told))
     return _sure(Verdict.UNKNOWN if is_unknown else Verdict.KNOWN, features)
+
+
+def _is_its_form(search: Search, rest: Sequence[Effort], told: float) -> bool:
+    # Whether what is left is a law of another form: at the balance, and over the quantity, where
+    # the effects explain most, and most of what there is. An effort that remembers is no form.
+    left = {(one.balance, one.argument): one.explained for one in rest}
+    most = max(rest, key=lambda one: one.explained, default=None)
+    if most is None or most.argument in PAST:
+        return False
+    whole = {(one.balance, one.argument): one.explained for one in efforts(
+        search.evidence, search.evidence.fit(search.plain.point))}
+    best = max(whole, key=lambda place: whole[place] - left.get(place, 0.0))
+    return best == (most.balance, most.argument) and (
+        told > setting('unknown_share') * whole[best])
 
 
 def _sure(verdict: Verdict, features: Features) -> Answer:
