@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -34,6 +34,9 @@ class Candidate:
         Those that differ.
     gain : float
         Log evidence over that of no change but those adopted [nats].
+    told : float
+        The same without the recording that speaks most for it, where each set has others: what
+        one recording says alone may be an accident of that one.
     before, shift : numpy.ndarray, shape (k,)
         Its parameters before, and what differs, on the scale of the estimates.
     sd : numpy.ndarray, shape (k,)
@@ -46,6 +49,7 @@ class Candidate:
     change: Change
     parameters: tuple[str, ...]
     gain: float
+    told: float
     before: FloatArray
     shift: FloatArray
     sd: FloatArray
@@ -92,7 +96,8 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     The fits do not know which recordings are of which set. So a gain is held against those of the
     same recordings parted in any other way into two sets of these sizes, once what is claimed to
     have changed is taken out of the later ones (permutation of the residuals, ter Braak 1992), and
-    against what unchanged robots gain.
+    against what unchanged robots gain; and so is what all but any one of the recordings gain
+    (jackknife). The larger chance of both counts.
 
     Parameters
     ----------
@@ -107,24 +112,29 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     Block
     """
     comparison = _Comparison(fits, adopted)
-    numbers, n = comparison.numbers, comparison.index.size
+    n = comparison.index.size
+    numbers = fits.base.settings.decision
+    by_any = {**numbers, 'null_gain': numbers['null_gain_by_any']}
     evidence = comparison.evidence(comparison.quadratics, later)
     candidates = comparison.candidates(evidence)
+    nothing = np.zeros(0, dtype=np.intp)
     every = evidence.solve(comparison.everything)
     anything = every.evidence - evidence.nothing
     all_of_it = np.zeros(n)
     all_of_it[comparison.everything] = every.shift
-    best_of_all, wholes = [], []
-    own: dict[Change, list[float]] = {one.change: [] for one in candidates}
+    best_of_all, told, wholes, wholes_told = [], [], [], []
+    own: dict[Change, list[Candidate]] = {one.change: [] for one in candidates}
     best = comparison.shift(evidence, candidates[0].parameters) if candidates else np.zeros(n)
     for way in partitions([q.recording for q in fits.quadratics], later,
                           int(numbers['partitions']), int(numbers['partitions_listed'])):
         weighed = comparison.candidates(comparison.evidence(comparison.without(best, later), way))
         best_of_all.append(weighed[0].gain if weighed else 0.0)
+        told.append(max((one.told for one in weighed), default=0.0))
         for one in weighed:
-            own[one.change].append(one.gain)
+            own[one.change].append(one)
         other = comparison.evidence(comparison.without(all_of_it, later), way)
         wholes.append(other.solve(comparison.everything).evidence - other.nothing)
+        wholes_told.append(other.told(comparison.everything, nothing))
     shared, moved = every.shared, all_of_it
     if adopted:
         shared, moved = evidence.solve(comparison.changed).shared, comparison.shift(evidence, ())
@@ -135,10 +145,14 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     bounds = fits.base.bounds()
     return Block(
         fits.base, np.clip(before, *bounds), np.clip(after, *bounds), fits.noise,
-        tuple(replace(one, chance=comparison.chance(
-            one, own[one.change], best_of_all, len(candidates))) for one in candidates),
-        comparison.explained(evidence), anything,
-        exchange_chance(anything, wholes, numbers))
+        tuple(replace(one, chance=max(
+            comparison.chance(one.parameters, one.gain, [o.gain for o in own[one.change]],
+                              best_of_all, len(candidates), numbers),
+            comparison.chance(one.parameters, one.told, [o.told for o in own[one.change]],
+                              told, len(candidates), by_any))) for one in candidates),
+        comparison.explained(evidence), anything, max(
+            exchange_chance(anything, wholes, numbers),
+            exchange_chance(evidence.told(comparison.everything, nothing), wholes_told, by_any)))
 
 
 def refitted(fits: RecordingFits, later: Collection[str], adopted: Sequence[Change],
@@ -235,7 +249,6 @@ class _Comparison:
 
     def __init__(self, fits: RecordingFits, adopted: Sequence[Change]) -> None:
         self.fits = fits
-        self.numbers = fits.base.settings.decision
         self.index = np.flatnonzero(fits.prior.free)
         self.quadratics = [one.among(self.index) for one in fits.quadratics]
         quantities = fits.base.settings.quantities
@@ -290,16 +303,16 @@ class _Comparison:
                 numbers['recordings_body' if base.given else 'recordings_loop'],
                 int(numbers['recording_rounds']), numbers['recording_free'])
 
-    def chance(self, one: Candidate, own: Sequence[float], best: Sequence[float], count: int
-               ) -> float:
+    def chance(self, names: Sequence[str], gain: float, own: Sequence[float],
+               best: Sequence[float], count: int, numbers: Mapping[str, float]) -> float:
         """
         Return how probable a gain is on a robot that has not changed.
 
         What the recordings are not fitted with shows no deviation of its own from one to another.
         """
-        if set(one.parameters) & set(self.fits.base.settings.runs_as):
-            return exchange_chance(one.gain, best, self.numbers)
-        return chance_of_one(one.gain, own, best, count, self.numbers)
+        if set(names) & set(self.fits.base.settings.runs_as):
+            return exchange_chance(gain, best, numbers)
+        return chance_of_one(gain, own, best, count, numbers)
 
     def candidates(self, evidence: Evidence) -> list[Candidate]:
         """
@@ -315,7 +328,9 @@ class _Comparison:
                 continue
             changed = self.places((*self._adopted, *names))
             solved = evidence.solve(changed)
+            gain = solved.evidence - known
             found.append(Candidate(
-                change, names, solved.evidence - known, solved.shared[changed[count:]],
-                solved.shift[count:], np.sqrt(np.diag(solved.covariance)[count:]), 1.0))
+                change, names, gain, gain if gain <= 0.0 else evidence.told(changed, self.changed),
+                solved.shared[changed[count:]], solved.shift[count:],
+                np.sqrt(np.diag(solved.covariance)[count:]), 1.0))
         return sorted(found, key=lambda one: -one.gain)

@@ -232,6 +232,34 @@ class Evidence:
         return self.solve(np.zeros(0, dtype=np.intp)).evidence
 
     @cached_property
+    def without_one(self) -> tuple[Evidence, ...]:
+        """This without each of the recordings; none where a set has no other one."""
+        later = sum(one.after for one in self.quadratics)
+        if min(later, len(self.quadratics) - later) < 2:
+            return ()
+        return tuple(replace(self, quadratics=[one for one in self.quadratics if one is not left])
+                     for left in self.quadratics)
+
+    def told(self, changed: NDArray[np.intp], known: NDArray[np.intp]) -> float:
+        """
+        Return what parameters that differ gain over some of them by all but any one recording.
+
+        Parameters
+        ----------
+        changed, known : numpy.ndarray of int
+            Indices of the parameters that differ, and of those that do so anyway.
+
+        Returns
+        -------
+        float
+            The least of the gains without each of the recordings, at the deviations from recording
+            to recording that all have; of all recordings where a set has but one [nats].
+        """
+        return min(one.solve(changed).evidence - (
+            one.solve(known).evidence if known.size else one.nothing)
+            for one in self.without_one or (self,))
+
+    @cached_property
     def _varying(self) -> list[tuple[FloatArray, FloatArray, float]]:
         return [one.varying(self.recording_sd) for one in self.quadratics]
 

@@ -242,8 +242,8 @@ def test_a_change_without_a_name_is_unknown() -> None:
     known = settings()
     base = base_of(known, load_model().parameters)
     z = base.start
-    named = Candidate(known.changes[3], known.changes[3].parameters, 20.0, z[:2], z[:2], z[:2],
-                      1e-4)
+    named = Candidate(known.changes[3], known.changes[3].parameters, 20.0, 20.0, z[:2], z[:2],
+                      z[:2], 1e-4)
     block = Block(base, z, z, first_noise(known), (named,), 0.0, 200.0, 1e-6)
 
     def said(block: Block) -> tuple[Decision, ...]:

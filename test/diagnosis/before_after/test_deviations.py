@@ -66,3 +66,24 @@ def test_derivatives_that_promise_what_is_not_there_are_no_deviation() -> None:
     solution = evidence.solve(np.array([0]))
     assert solution.shift[0] == pytest.approx(shift, abs=0.01)
     assert solution.evidence - evidence.nothing > 10.0
+
+
+@pytest.mark.parametrize('alone', [True, False])
+def test_what_one_recording_says_alone_is_told_by_none(alone: bool) -> None:
+    """A change that all later recordings show is told without any of them."""
+    later = [0.0, 0.0, 0.3] if alone else [0.1, 0.1, 0.1]
+    recordings = [recording(k, [(0.0, 0.0, 0.0, *later)[k]], np.array([[1e4]]), k > 2)
+                  for k in range(6)]
+    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.02), np.full(1, 0.1))
+    changed, none = np.array([0]), np.zeros(0, dtype=np.intp)
+    gain = evidence.solve(changed).evidence - evidence.nothing
+    assert gain > 5.0
+    assert evidence.told(changed, none) < 0.0 if alone else evidence.told(
+        changed, none) > 0.5 * gain
+
+
+def test_a_set_of_one_recording_tells_by_all_of_them() -> None:
+    recordings = [recording(k, [0.1 * (k > 1)], np.array([[1e4]]), k > 1) for k in range(3)]
+    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.02), np.full(1, 0.1))
+    changed, none = np.array([0]), np.zeros(0, dtype=np.intp)
+    assert evidence.told(changed, none) == evidence.solve(changed).evidence - evidence.nothing

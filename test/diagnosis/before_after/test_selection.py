@@ -24,7 +24,8 @@ LATENCY, CURRENT, SAG = (next(one for one in KNOWN.changes if one.effect == effe
 def weighed(change: Change, gain: float, chance: float) -> Candidate:
     """Return a change with a gain."""
     n = len(change.parameters)
-    return Candidate(change, change.parameters, gain, np.zeros(n), np.ones(n), np.ones(n), chance)
+    return Candidate(change, change.parameters, gain, gain, np.zeros(n), np.ones(n), np.ones(n),
+                     chance)
 
 
 def said(gain: Callable[[frozenset[str]], float], chance: float = 1e-6
