@@ -73,8 +73,7 @@ def _intervals(fit: Fit) -> list[tuple[Unknown, float, float]]:
     # Each number of the robot or an effect with its place and half of its 95 % interval there.
     nu = setting('student')
     weight = (nu + 1.0) / (nu + fit.whitened ** 2)
-    normal = normal_matrix(fit.jacobian, weight) + np.diag(
-        fit.point.weights ** 2)
+    normal = normal_matrix(fit.jacobian, weight) + np.diag(fit.point.weights ** 2)
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
     covariance = np.linalg.pinv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
     # A number that moves no reading has no information, of which a pseudo-inverse makes certainty.

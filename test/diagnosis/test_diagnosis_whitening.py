@@ -12,6 +12,7 @@ from lg_husky_sim.diagnosis.evidence.drives import Channel, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import (
     fit_noise,
+    negative_log_likelihood,
     Noise,
     sensor_variance,
     Whitener,
@@ -119,6 +120,25 @@ def test_intensities_are_recovered_within_a_quarter(setup: tuple[Evidence, Point
                       evidence.pool, 12, setting('longest_time')).values
     for name in ('force', 'moment', 'drive', 'wheel', 'gyro', 'place', 'heading'):
         assert found[name] == pytest.approx(TRUE.values[name], rel=0.25), name
+
+
+def test_six_sets_of_derivatives_lead_from_far_away_to_the_maximum(
+        setup: tuple[Evidence, Point]) -> None:
+    """A search from where it ended gains nothing more."""
+    evidence = setup[0]
+    whitener = known(evidence.whiteners[0])
+    residuals = [np.ascontiguousarray(column)
+                 for column in simulated(whitener, TRUE, 2, 4).T]
+    start = Noise({name: value if name.endswith('_time') else 30.0 * value
+                   for name, value in TRUE.values.items()})
+
+    def searched(begin: Noise, rounds: int) -> tuple[Noise, float]:
+        found = fit_noise(begin, [whitener.frame] * 2, [whitener.model] * 2, residuals,
+                          evidence.pool, rounds, setting('longest_time'))
+        own = whitener_of(whitener.frame, whitener.model, found)
+        return found, sum(negative_log_likelihood(own.apply(r), own.scale) for r in residuals)
+    found, cost = searched(start, 6)
+    assert cost - searched(found, 20)[1] < 2.0
 
 
 def test_whitening_is_linear_and_does_not_look_ahead(setup: tuple[Evidence, Point]) -> None:

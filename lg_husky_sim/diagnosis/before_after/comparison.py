@@ -35,8 +35,8 @@ class Candidate:
     gain : float
         Log evidence over that of no change but those adopted [nats].
     told : float
-        The same without the recording that speaks most for it, where each set has others: what
-        one recording says alone may be an accident of that one.
+        The same by all but any one of the recordings, see :meth:`Evidence.told`: what one
+        recording says alone may be an accident of that one.
     before, shift : numpy.ndarray, shape (k,)
         Its parameters before, and what differs, on the scale of the estimates.
     sd : numpy.ndarray, shape (k,)
