@@ -312,7 +312,7 @@ class _Comparison:
         """
         if set(names) & set(self.fits.base.settings.runs_as):
             return exchange_chance(gain, best, numbers)
-        return chance_of_one(gain, own, best, count, numbers)
+        return chance_of_one(gain, own, best, count, len(self.quadratics), numbers)
 
     def candidates(self, evidence: Evidence) -> list[Candidate]:
         """

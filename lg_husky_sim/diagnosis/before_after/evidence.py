@@ -137,11 +137,14 @@ class Evidence:
 
         By expectation and maximisation with both sets free, so that a change is none of them::
 
-            sd^2 = (weight sd_assumed^2 + sum of E[deviation^2]) / (weight + n_recordings)
+            sd^2 = (weight k sd_assumed^2 + sum of E[deviation^2]) / (weight + n_recordings)
+            k = max(1, n_others / sum of sd_assumed^2 / sd^2 of all other parameters)
 
-        but none is larger than by how far apart the fits of the parameter ended, for where
-        parameters depend on each other, derivatives that are a little off promise that a recording
-        is far from where it ended. With places p of curvature c, for each parameter by itself::
+        where k is what the others have in common, of rough ground say: the likeliest scale of
+        inverse gamma distributions. But none is larger than by how far apart the fits of the
+        parameter ended, for where parameters depend on each other, derivatives that are a little
+        off promise that a recording is far from where it ended. With places p of curvature c, for
+        each parameter by itself::
 
             E[deviation^2] = s^2 ((p - m)^2 + 1 / sum of w) + (1 - s) sd^2
             w = c / (1 + sd^2 c),  s = sd^2 w,  m = sum of w p / sum of w for each set
@@ -179,7 +182,7 @@ class Evidence:
                 squares += deviation ** 2 + np.diag(spread) + np.sum(
                     move @ covariance * move, axis=1)
             found = replace(found, recording_sd=np.minimum(most, np.sqrt(
-                (weight * self.recording_sd ** 2 + sd ** 2 * squares)
+                (weight * self._common(sd) * self.recording_sd ** 2 + sd ** 2 * squares)
                 / (weight + len(self.quadratics)))))
         return replace(found, change_sd=self.change_sd)
 
@@ -199,9 +202,17 @@ class Evidence:
                 off = places - (w * places).sum(axis=0) / total
                 squares += (share ** 2 * (off ** 2 + 1.0 / total)
                             + (1.0 - share) * sd ** 2).sum(axis=0)
-            sd = np.sqrt((weight * self.recording_sd ** 2 + squares)
+            sd = np.sqrt((weight * self._common(sd) * self.recording_sd ** 2 + squares)
                          / (weight + len(self.quadratics)))
         return sd
+
+    def _common(self, sd: FloatArray) -> FloatArray:
+        # By how much the variances of all other parameters exceed what is assumed.
+        share = (self.recording_sd / np.maximum(sd, np.finfo(np.float64).tiny)) ** 2
+        others = np.count_nonzero(share) - 1
+        if others < 1:
+            return np.ones(sd.size)
+        return np.asarray(np.maximum(1.0, others / (share.sum() - share)), dtype=np.float64)
 
     def solve(self, changed: NDArray[np.intp]) -> Solution:
         """

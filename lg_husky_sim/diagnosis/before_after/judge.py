@@ -23,16 +23,19 @@ def is_beyond_chance(one: Weighed, numbers: Mapping[str, float]) -> bool:
 
 
 def chance_of_one(gain: float, own: Sequence[float], best: Sequence[float], count: int,
-                  numbers: Mapping[str, float]) -> float:
+                  recordings: int, numbers: Mapping[str, float]) -> float:
     """
     Return how probable the gain of one of several changes is where nothing has changed.
 
     By what it gains in the other partitions itself, with what the best of all gains there as the
     expected mean, if that is more; for each of those that are weighed (Bonferroni)::
 
-        b = max(null_gain, mean of the best),  P = count (1 + gain / (a b + sum))^-(a + n)
+        b = max(null_gain, mean of the best),  m = min(n, recordings - 2)
+        P = count (1 + gain / (a b + m mean of its own))^-(a + m)
 
-    or by the best of all, where that is less: whichever it is that gains by chance.
+    or by the best of all, where that is less: whichever it is that gains by chance. The gains of
+    one change in all partitions come from as many values as there are recordings, less the mean of
+    each set: where one is large, the others are small. They are worth no more than that many.
 
     Parameters
     ----------
@@ -42,6 +45,8 @@ def chance_of_one(gain: float, own: Sequence[float], best: Sequence[float], coun
         Of the other partitions: of this change, and of whichever gains most [nats].
     count : int
         Changes that are weighed.
+    recordings : int
+        Of both sets.
     numbers : mapping of str to float
         ``decision`` of the settings.
 
@@ -53,10 +58,11 @@ def chance_of_one(gain: float, own: Sequence[float], best: Sequence[float], coun
     mean = max([numbers['null_gain'], *([sum(max(one, 0.0) for one in best) / len(best)]
                                         if best else [])])
     return min(exchange_chance(gain, best, numbers), count * exchange_chance(
-        gain, own, {**numbers, 'null_gain': mean}))
+        gain, own, {**numbers, 'null_gain': mean}, recordings - 2))
 
 
-def exchange_chance(gain: float, others: Sequence[float], numbers: Mapping[str, float]) -> float:
+def exchange_chance(gain: float, others: Sequence[float], numbers: Mapping[str, float],
+                    most: int | None = None) -> float:
     """
     Return how probable a gain is where recordings may change places between the sets.
 
@@ -75,11 +81,16 @@ def exchange_chance(gain: float, others: Sequence[float], numbers: Mapping[str, 
         Of the other partitions [nats].
     numbers : mapping of str to float
         ``decision`` of the settings: a is ``null_weight``, b ``null_gain``.
+    most : int, optional
+        What the other partitions are worth at most; if not given, one each.
 
     Returns
     -------
     float
     """
     weight = numbers['null_weight']
-    total = weight * numbers['null_gain'] + sum(max(one, 0.0) for one in others)
-    return float((1.0 + max(gain, 0.0) / total) ** -(weight + len(others)))
+    worth = len(others) if most is None else min(len(others), most)
+    total = weight * numbers['null_gain']
+    if worth:
+        total += worth / len(others) * sum(max(one, 0.0) for one in others)
+    return float((1.0 + max(gain, 0.0) / total) ** -(weight + worth))

@@ -12,6 +12,7 @@ from lg_husky_sim.diagnosis.before_after.commands import accepted
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 
 class Memory(threading.local):
@@ -32,6 +33,17 @@ class Memory(threading.local):
         return self._numbers[:count].reshape(shape)
 
 
+def distinct(rows: FloatArray) -> tuple[list[list[float]], NDArray[np.intp]]:
+    """
+    Return the rows that differ, and which of them each one is.
+
+    Of few rows, this takes a tenth of the time of `numpy.unique`.
+    """
+    found: dict[tuple[float, ...], int] = {}
+    which = [found.setdefault(tuple(row), len(found)) for row in rows.tolist()]
+    return [list(row) for row in found], np.array(which, dtype=np.intp)
+
+
 def _accepted(base: Base, drive: Drive, robots: FloatArray, begin: FloatArray) -> FloatArray:
     # The command that each robot takes; most take the same.
     found = np.empty((drive.steps, 2, len(robots)))
@@ -42,14 +54,14 @@ def _accepted(base: Base, drive: Drive, robots: FloatArray, begin: FloatArray) -
     for column, (axis, gain, now) in enumerate((
             ('forward', 'speed_gain', ahead), ('yaw', 'turn_width', turning))):
         how = robots[:, [at('dead_time'), at(f'limit_{axis}'), at(f'slew_{axis}'), at(gain)]]
-        rows, which = np.unique(how, axis=0, return_inverse=True)
+        rows, which = distinct(how)
         taken = np.empty((drive.steps, len(rows)))
         one = np.empty(drive.steps)
-        for k, (late, most, slew, gain_here) in enumerate(rows.tolist()):
+        for k, (late, most, slew, gain_here) in enumerate(rows):
             accepted(drive.command.times, values[column], late, most, slew, now / gain_here,
                      drive.start, base.settings.simulation['step'], one)
             taken[:, k] = one
-        found[:, column] = taken[:, which.reshape(-1)]
+        found[:, column] = taken[:, which]
     return found
 
 
@@ -87,10 +99,10 @@ def moved(base: Base, drive: Drive, robots: FloatArray, memory: Memory | None = 
     wheels, command = np.zeros((drive.steps + 1, 2, len(lanes))), np.zeros((1, 2, len(lanes)))
     if base.given:
         times = drive.start + step * np.arange(drive.steps + 1)
-        late, which = np.unique(robots[:, at('wheels_late')], return_inverse=True)
+        late, which = distinct(robots[:, [at('wheels_late')]])
         for column, values in enumerate(drive.wheels.values.T):
             read = np.column_stack([np.interp(times + one, drive.wheels.times, values)
-                                    for one in late])
+                                    for (one,) in late])
             wheels[:, column] = read[:, which]
     else:
         command = _accepted(base, drive, robots, drive.begin)

@@ -10,7 +10,7 @@ from lg_husky_sim.diagnosis.before_after.base import Base
 from lg_husky_sim.diagnosis.before_after.base_robot import OUTPUTS, ROBOT
 from lg_husky_sim.diagnosis.before_after.drives import Bins, Drive
 from lg_husky_sim.diagnosis.before_after.means import mean_in_bins
-from lg_husky_sim.diagnosis.before_after.motion import Memory, moved, side_by_side
+from lg_husky_sim.diagnosis.before_after.motion import distinct, Memory, moved, side_by_side
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +31,9 @@ def _read(base: Base, drive: Drive, stream: str, motion: FloatArray, first: str,
     # Means in the bins of a stream, of the outputs from the first to the last, for each robot:
     # of its lane, or of the only one.
     bins, begin, lanes = drive.bins[stream], OUTPUTS.index(first), motion.shape[2]
-    times, which = np.unique(later, return_inverse=True)
-    found = np.empty((times.size, bins.edges.size, OUTPUTS.index(last) + 1 - begin, lanes))
-    for one, out in zip(times, found, strict=True):
+    times, which = distinct(later[:, None])
+    found = np.empty((len(times), bins.edges.size, OUTPUTS.index(last) + 1 - begin, lanes))
+    for (one,), out in zip(times, found, strict=True):
         mean_in_bins(motion, begin, drive.start, base.settings.simulation['step'], bins.times,
                      bins.edges, one, first in PLACES, out)
     lane = np.minimum(np.arange(later.size), lanes - 1)
@@ -110,14 +110,14 @@ def _turn_by_gyro(drive: Drive, bins: Bins, value: Mapping[str, FloatArray]) -> 
     # is to be the factor times what the pose has. No error of the robot's model can enter. Most
     # robots' are the same.
     pose = np.diff(bins.values[:, 2])
-    rows, which = np.unique(np.column_stack([value[name] for name in (
-        'pose_late', 'imu_late', 'gyro_factor', 'gyro_bias')]), axis=0, return_inverse=True)
+    rows, which = distinct(np.column_stack([value[name] for name in (
+        'pose_late', 'imu_late', 'gyro_factor', 'gyro_bias')]))
     found = []
-    for pose_late, imu_late, factor, bias in rows.tolist():
+    for pose_late, imu_late, factor, bias in rows:
         times = bins.times - pose_late + imu_late
         turned = np.diff(bins.mean(np.interp(times, drive.gyro[:, 0], drive.gyro[:, 1])))
         found.append(pose - (turned - factor * pose - bias * np.diff(bins.mean(times))))
-    return np.asarray(np.column_stack(found)[:, which.reshape(-1)])
+    return np.asarray(np.column_stack(found)[:, which])
 
 
 def measured(base: Base, drive: Drive) -> dict[str, FloatArray]:

@@ -52,6 +52,21 @@ def test_recordings_that_say_nothing_leave_what_is_assumed() -> None:
     assert evidence.estimated(2.0, 30, 30.0).recording_sd[0] == pytest.approx(0.02)
 
 
+def test_where_all_differ_more_so_does_what_no_recording_tells() -> None:
+    """Rough ground makes recordings differ in everything."""
+    rng = np.random.default_rng(3)
+    precise = np.diag([1e6] * 20 + [0.0])
+    recordings = [recording(k, [*(0.08 * rng.standard_normal(20)), 0.0], precise, k > 2)
+                  for k in range(6)]
+    evidence = Evidence(recordings, np.zeros(21), np.ones(21), np.full(21, 0.01),
+                        np.full(21, 0.1))
+    found = evidence.estimated(4.0, 20, 30.0).recording_sd
+    assert found[:20].mean() == pytest.approx(0.08, rel=0.15)
+    assert found[20] == pytest.approx(0.08, rel=0.25)
+    half = replace(evidence, quadratics=[one.less(0.995 * one.place) for one in recordings])
+    assert half.estimated(4.0, 20, 30.0).recording_sd[20] == pytest.approx(0.01)
+
+
 def test_derivatives_that_promise_what_is_not_there_are_no_deviation() -> None:
     """The fits have ended alike in each set, though their derivatives say they are far apart."""
     shift, promised = 0.1, 0.3

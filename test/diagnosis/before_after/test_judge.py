@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import combinations
 
 from lg_husky_sim.diagnosis.before_after.base import Base, base_of
 from lg_husky_sim.diagnosis.before_after.comparison import Block, compare, partitions
@@ -163,25 +164,38 @@ def test_a_gain_is_rare_where_it_is_far_above_those_of_other_partitions() -> Non
 
 
 def test_what_others_gain_by_chance_does_not_hide_a_change_that_does_not() -> None:
+    """With as many recordings as tell the one from the others."""
     numbers = {'null_weight': 2.0, 'null_gain': 5.0}
-    own, best = [2.0] * 9, [75.0] * 9
-    assert chance_of_one(340.0, own, best, 35, numbers) < 1e-3
+    own, best = [2.0] * 30, [75.0] * 30
+    assert chance_of_one(340.0, own, best, 35, 12, numbers) < 1e-3
     assert exchange_chance(340.0, best, numbers) > 0.01
-    assert chance_of_one(340.0, best, best, 35, numbers) == exchange_chance(340.0, best, numbers)
-    assert chance_of_one(60.0, own, best, 35, numbers) > 0.1
-    assert chance_of_one(9.0, [0.0] * 9, [1.0] * 9, 35, numbers) > 0.01
-    assert chance_of_one(100.0, [], [], 35, numbers) == exchange_chance(100.0, [], numbers)
+    assert chance_of_one(340.0, own, best, 35, 6, numbers) > 0.01
+    assert chance_of_one(340.0, best, best, 35, 12, numbers) == exchange_chance(
+        340.0, best, numbers)
+    assert chance_of_one(60.0, own, best, 35, 12, numbers) > 0.1
+    assert chance_of_one(9.0, [0.0] * 9, [1.0] * 9, 35, 6, numbers) > 0.01
+    assert chance_of_one(100.0, [], [], 35, 2, numbers) == exchange_chance(100.0, [], numbers)
 
 
 def test_of_many_changes_few_are_beyond_chance() -> None:
-    """Though each has partitions of its own; scales differ from robot to robot."""
-    rng, numbers = np.random.default_rng(6), {'null_weight': 2.0, 'null_gain': 5.0}
-    flagged = []
-    for _ in range(2000):
-        drawn = 10.0 / rng.gamma(2.0) * rng.exponential(size=(20, 10))
-        best = list(drawn[:, 1:].max(axis=0))
-        flagged.append(min(chance_of_one(row[0], list(row[1:]), best, 20, numbers)
-                           for row in drawn) < 0.02)
+    """
+    Though each has partitions of its own.
+
+    The values of six recordings give all ten of them: where one gains by chance, the others do
+    not, since the deviation is estimated from the same values.
+    """
+    rng, numbers = np.random.default_rng(6), {'null_weight': 2.0, 'null_gain': 2.5}
+    ways = [way for way in combinations(range(6), 3) if 0 in way]
+    contrast = np.array([[1.0 if k in way else -1.0 for k in range(6)] for way in ways]).T / 3.0
+    assumed, flagged = 2.0, []
+    for _ in range(1000):
+        x = rng.standard_normal((25, 6))
+        apart = 1.5 * (x @ contrast) ** 2
+        within = 6.0 * np.var(x, axis=1)[:, None] - apart
+        gain = np.maximum(0.5 * apart * (assumed + 4.0) / (assumed + within) - 1.0, 0.0)
+        best = list(gain[:, 1:].max(axis=0))
+        flagged.append(min(chance_of_one(row[0], list(row[1:]), best, 25, 6, numbers)
+                           for row in gain) < 0.02)
     assert np.mean(flagged) < 0.02
 
 
