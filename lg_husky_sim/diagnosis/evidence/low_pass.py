@@ -1,6 +1,14 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A first-order low pass; scipy.signal would take half a second to import."""
+"""
+A first-order low pass of a rate that is known with its integral.
+
+Between two times the rate is the parabola that has its values at both and the integral between
+them, and the filter answers a parabola in closed form::
+
+    y' = (c0 + c1 s + c2 s^2 - y) / T
+    y(s) = c0 + c1 (s - T) + c2 (s^2 - 2 T s + 2 T^2) + (y(0) - c0 + c1 T - 2 c2 T^2) e^(-s / T)
+"""
 
 from __future__ import annotations
 
@@ -8,34 +16,53 @@ from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
+#: Step below which the difference of two integrals is rounding: the rate is a straight line [s].
+SHORTEST = 1e-4
+
 
 @jit
-def _follow(values: FloatArray, keep: float, share: float, out: FloatArray) -> None:
-    # Begins at rest at the first value.
-    memory = share * values[0]
-    for k in range(values.size):
-        out[k] = memory + (1.0 - share) * values[k]
-        memory = (share - keep) * values[k] + keep * out[k]
+def _follow(times: FloatArray, rates: FloatArray, turned: FloatArray, lag: float, out: FloatArray
+            ) -> None:
+    # Begins at rest at the first rate.
+    out[0] = rates[0]
+    for k in range(1, times.size):
+        step = times[k] - times[k - 1]
+        if step <= 0.0:
+            out[k] = out[k - 1]
+            continue
+        first, last = rates[k - 1], rates[k]
+        mean = 0.5 * (first + last)
+        if step > SHORTEST:
+            mean = (turned[k] - turned[k - 1]) / step
+        slope = (6.0 * mean - 4.0 * first - 2.0 * last) / step
+        bend = 3.0 * (first + last - 2.0 * mean) / (step * step)
+        steady = first - slope * lag + 2.0 * bend * lag * lag
+        out[k] = (steady + slope * step + bend * step * (step - 2.0 * lag)
+                  + (out[k - 1] - steady) * np.exp(-step / lag))
 
 
-def low_passed(values: FloatArray, step: float, lag: float) -> FloatArray:
+def low_passed(times: FloatArray, rates: FloatArray, turned: FloatArray, lag: float
+               ) -> FloatArray:
     """
-    Return a signal behind a first-order low pass; exact where it is straight within a step.
+    Return a rate behind a first-order low pass.
 
     Parameters
     ----------
-    values : numpy.ndarray, shape (n,)
-        Evenly spaced; the filter begins at rest at the first one.
-    step : float
-        Spacing [s].
+    times : numpy.ndarray, shape (n,)
+        Not decreasing [s]; the filter begins at rest at the first.
+    rates : numpy.ndarray, shape (n,)
+        At these times [rad/s].
+    turned : numpy.ndarray, shape (n,)
+        Their integral [rad].
     lag : float
         Time constant [s].
 
     Returns
     -------
     numpy.ndarray, shape (n,)
+        [rad/s]
     """
-    keep = float(np.exp(-step / lag))
-    out = np.empty(values.size)
-    _follow(np.ascontiguousarray(values), keep, lag / step * (1.0 - keep), out)
+    out = np.empty(times.size)
+    _follow(np.ascontiguousarray(times), np.ascontiguousarray(rates),
+            np.ascontiguousarray(turned), lag, out)
     return out

@@ -77,6 +77,10 @@ def sensor_variance(frame: Frame, noise: Noise) -> FloatArray:
         part = frame.drive.slice_of(channel)
         out[part] = (frame.drive.rounding[part] + values[level] ** 2
                      + (values[jitter] * frame.slopes[part]) ** 2)
+        if level == 'wheel' and not frame.drive.still:
+            # They tell how the drive begins; what has been commanded until then is not known.
+            out[part] += np.where(frame.times[part] < frame.drive.start + setting('start_window'),
+                                  setting('start_wheels') ** 2, 0.0)
     return out
 
 

@@ -105,6 +105,7 @@ def command_lag(drive: Drive, reading: Reading) -> float:
 
 
 def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bool) -> Wanted:
+    acting = drive.commands.times + command_lag(drive, reading)
     wheels: FloatArray = drive.wheel_times - delays[0]
     imu: FloatArray = drive.imu_times - delays[1]
     pose: FloatArray = drive.pose_times - delays[2]
@@ -115,14 +116,14 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
         begins = wheels[:0]
     elif reading.wheels is WheelReading.FILTERED:
         begins = wheels[:0]
-        ends = _even(drive, wheels)
+        ends = _nodes(drive, wheels, acting)
     else:
         ends = wheels + {WheelReading.WINDOW_END: 0.0, WheelReading.WINDOW_MIDDLE: 0.5,
                          WheelReading.WINDOW_START: 1.0}[reading.wheels] * window
         begins = ends - window
     imu_begins = imu[:0]
     if reading.imu == math.inf and imu.size > 3:
-        imu = _even(drive, imu)
+        imu = _nodes(drive, imu, acting)
     elif reading.imu is not None and imu.size > 3:
         window = reading.values.get('imu_window', float(np.median(np.diff(drive.imu_times))))
         imu = imu + reading.imu * window
@@ -148,12 +149,16 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
     return Wanted(events, parts, spans)
 
 
-def _even(drive: Drive, stamps: FloatArray) -> FloatArray:
-    # Times that a low pass follows.
+def _nodes(drive: Drive, stamps: FloatArray, commands: FloatArray) -> FloatArray:
+    # Times at which a low pass looks at what it follows: the stamps, where a command acts, which
+    # is where an acceleration jumps, and some between.
     step = setting('filter_step')
-    first = min(drive.start, float(np.min(stamps))) if stamps.size else drive.start
-    count = int(np.ceil((drive.end - first) / step)) + 2
-    return np.asarray(first + step * np.arange(count), dtype=np.float64)
+    first = max(drive.start, float(np.min(stamps)) if stamps.size else drive.start)
+    last = max(drive.end, float(np.max(stamps)) if stamps.size else drive.end)
+    even = drive.start + step * np.arange(int(np.ceil((last - drive.start) / step)) + 1)
+    acting = commands[(commands > first) & (commands < last)]
+    return np.asarray(np.unique(np.maximum(np.concatenate(
+        [even, stamps, acting, acting + 0.25 * step]), drive.start)), dtype=np.float64)
 
 
 def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) -> Motion:
@@ -238,24 +243,26 @@ def _signature(plant: Plant) -> bytes:
 
 def _rate(motion: Motion, drive: Drive, side: str, reading: Reading, late: float) -> FloatArray:
     if reading.wheels is WheelReading.FILTERED:
-        return _followed(motion, f'wheel_{side}', 'wheels', drive.wheel_times - late,
-                         reading.get('wheel_window'))
+        return _followed(motion, f'wheel_{side}', f'angle_{side}', 'wheels',
+                         drive.wheel_times - late, reading.get('wheel_window'))
     turned = motion.column(f'angle_{side}', 'wheels') - motion.column(f'angle_{side}', 'begins')
     return _mean_rate(turned, motion.wanted.spans, motion.column(f'wheel_{side}', 'wheels'))
 
 
-def _followed(motion: Motion, name: str, part: str, stamps: FloatArray, lag: float
+def _followed(motion: Motion, rate: str, turned: str, part: str, stamps: FloatArray, lag: float
               ) -> FloatArray:
     # Behind a low pass.
-    followed = low_passed(motion.column(name, part), setting('filter_step'), max(lag, 1e-6))
-    found: FloatArray = np.interp(stamps, motion.times[motion.wanted.parts[part]], followed)
+    times = motion.times[motion.wanted.parts[part]]
+    followed = low_passed(times, motion.column(rate, part), motion.column(turned, part),
+                          max(lag, 1e-6))
+    found: FloatArray = followed[np.searchsorted(times, np.maximum(stamps, times[0]))]
     return found
 
 
 def _yaw_rate(motion: Motion, drive: Drive, reading: Reading, late: float) -> FloatArray:
     # Of the moment, or the mean over a window, or behind a low pass.
     if reading.imu == math.inf and drive.imu_times.size > 3:
-        return _followed(motion, 'yaw_rate', 'imu', drive.imu_times - late,
+        return _followed(motion, 'yaw_rate', 'heading', 'imu', drive.imu_times - late,
                          reading.get('imu_window'))
     parts = motion.wanted.parts
     if parts['imu_begins'].start == parts['imu_begins'].stop:

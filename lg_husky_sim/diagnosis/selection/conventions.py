@@ -24,7 +24,7 @@ from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 
-def best_reading(evidence: Evidence, fit: Fit) -> Fit:
+def best_reading(evidence: Evidence, fit: Fit, others: Sequence[Point] = ()) -> Fit:
     """
     Choose the reading that makes a fitted model likeliest.
 
@@ -33,28 +33,34 @@ def best_reading(evidence: Evidence, fit: Fit) -> Fit:
     evidence : Evidence
     fit : Fit
         Of the model.
+    others : sequence of Point
+        Where fits may begin as well: a fit may have taken the place of a reading.
 
     Returns
     -------
     Fit
         With that reading, under the same noise; the given one where none is better.
     """
-    chosen = _better(evidence, fit, 'wheel_window', _wheel_options)
+    chosen = _better(evidence, fit, 'wheel_window', _wheel_options, others)
     return _better(evidence, chosen, 'imu_window', _imu_options)
 
 
 def _better(evidence: Evidence, fit: Fit, window: str,
-            options_of: Callable[[Evidence, Reading], Sequence[Reading]]) -> Fit:
+            options_of: Callable[[Evidence, Reading], Sequence[Reading]],
+            others: Sequence[Point] = ()) -> Fit:
     options = options_of(evidence, fit.point.reading)
     if not options:
         return fit
-    points = [_read_so(evidence, fit, one) for one in options]
-    promised = evidence.pool.map(_promise_of(evidence, fit), points)
-    order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
+    chosen: list[Point] = []
+    for begin in (fit.point, *others):
+        points = [_read_so(evidence, begin, one) for one in options]
+        promised = evidence.pool.map(_promise_of(evidence, fit), points)
+        order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
+        chosen += [points[place] for place in order]
     # All by as many steps: what the same reading gains by them is not due to another one.
     rounds = int(setting('reading_rounds'))
     tried = evidence.pool.map(
-        lambda place: evidence.fit(points[place], fit.slopes, rounds=rounds), order)
+        lambda point: evidence.fit(point, fit.slopes, rounds=rounds), chosen)
     best = min(tried, key=lambda one: one.cost, default=fit)
     same = min(fit, evidence.fit(fit.point, rounds=rounds), key=lambda one: one.cost)
     if best.cost > same.cost - setting('reading_gain'):
@@ -85,9 +91,9 @@ def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
     return promise
 
 
-def _read_so(evidence: Evidence, fit: Fit, reading: Reading) -> Point:
+def _read_so(evidence: Evidence, point: Point, reading: Reading) -> Point:
     # With as late a stream on the whole as before: what the reading is late, its stamps are not.
-    now = fit.point.log
+    now = point.log
     other = replace(reading, values={**now.values, **reading.values})
     period = _imu_period(evidence)
     spared = {'delay_wheels': wheel_lag(now) - wheel_lag(other),
@@ -96,8 +102,8 @@ def _read_so(evidence: Evidence, fit: Fit, reading: Reading) -> Point:
         place if u.kind != 'log' else u.place(reading.values[u.name]) if u.name in (
             'wheel_window', 'imu_window') and u.name in reading.values
         else place + spared.get(u.name, 0.0)
-        for u, place in zip(fit.point.unknowns, fit.point.places, strict=True)])
-    return replace(fit.point, reading=reading).at(places)
+        for u, place in zip(point.unknowns, point.places, strict=True)])
+    return replace(point, reading=reading).at(places)
 
 
 def _imu_period(evidence: Evidence) -> float:

@@ -87,8 +87,8 @@ class Logged:
     early: Sequence[Tried] = ()
 
 
-def _as_logged(evidence: Evidence, base: Fit) -> Logged:
-    chosen = best_reading(evidence, base)
+def _as_logged(evidence: Evidence, base: Fit, others: Sequence[Point] = ()) -> Logged:
+    chosen = best_reading(evidence, base, others)
     if chosen is base:
         return Logged(base)
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
@@ -243,7 +243,7 @@ def recalibrated(evidence: Evidence, start: Point) -> Recalibrated:
     stamped, point = likeliest_stamps(evidence, rough)
     if stamped is not evidence:
         evidence, rough = stamped, stamped.fit(point, rounds=1)
-    logged = _as_logged(evidence, rough)
+    logged = _as_logged(evidence, rough, [_nominal(rough.point)])
     start = _nominal(logged.fit.point)
     return Recalibrated(evidence, rough, logged, *calibrated(evidence.about(start), start))
 
