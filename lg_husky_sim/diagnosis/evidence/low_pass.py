@@ -12,17 +12,15 @@ them, and the filter answers a parabola in closed form::
 
 from __future__ import annotations
 
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Step below which the difference of two integrals is rounding: the rate is a straight line [s].
-SHORTEST = 1e-4
-
 
 @jit
-def _follow(times: FloatArray, rates: FloatArray, turned: FloatArray, lag: float, out: FloatArray
-            ) -> None:
+def _follow(times: FloatArray, rates: FloatArray, turned: FloatArray, lag: float,
+            shortest: float, out: FloatArray) -> None:
     # Begins at rest at the first rate.
     out[0] = rates[0]
     for k in range(1, times.size):
@@ -32,7 +30,7 @@ def _follow(times: FloatArray, rates: FloatArray, turned: FloatArray, lag: float
             continue
         first, last = rates[k - 1], rates[k]
         mean = 0.5 * (first + last)
-        if step > SHORTEST:
+        if step > shortest:
             mean = (turned[k] - turned[k - 1]) / step
         slope = (6.0 * mean - 4.0 * first - 2.0 * last) / step
         bend = 3.0 * (first + last - 2.0 * mean) / (step * step)
@@ -64,5 +62,5 @@ def low_passed(times: FloatArray, rates: FloatArray, turned: FloatArray, lag: fl
     """
     out = np.empty(times.size)
     _follow(np.ascontiguousarray(times), np.ascontiguousarray(rates),
-            np.ascontiguousarray(turned), lag, out)
+            np.ascontiguousarray(turned), lag, setting('filter_shortest'), out)
     return out

@@ -20,6 +20,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, neutral_of, Numbers
+from lg_husky_sim.diagnosis.selection.narrowing import narrowed
 from lg_husky_sim.diagnosis.selection.onsets import onset_looks, refined
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.selection.ties import is_near
@@ -152,6 +153,10 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
         key = point.places.tobytes() if is_distorted(base) else b''
         if key not in starts or cost < starts[key][0]:
             starts[key] = cost, start
+    for key, point in {point.places.tobytes(): point for point, _ in begins}.items():
+        likeliest = narrowed(evidence, hypothesis, point)
+        if likeliest is not None:
+            starts[b'narrowed' + key] = 0.0, hypothesis.point(point, likeliest)
     size = len(base.point.unknowns)
     few = int(setting('whole_rounds'))
     found = []
