@@ -206,19 +206,21 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     """
     seen = _looks(evidence, base, pool, None if nominal is not None else ())
     few = int(setting('fitted'))
-    # Which effect it will be, and so how much it needs, is not known yet.
-    least = setting('least_apart') * first
-    if not seeds and (not seen or setting('look_trust') * seen[0].gain < least):
-        return Round(evidence, base, (), False, 1.0, tuple(seen))
     tried = fitted(evidence, base, seen[:few], [base.point], whole=False)
     tried = sorted([*tried, *seeds], key=lambda t: -t.score)
     starts = sum(len(h.trials()) for h in pool)
     chance = _chance(evidence, tried[0], starts) if tried else 1.0
-    if chance > setting('hopeless') or tried[0].gain < 0.5 * least:
+    if chance > setting('hopeless'):
         return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
-    for _ in range(2):
+    # Noise may have taken the place of what is missing: what it gains with noise of its own.
+    # Which effect it will be, and so how much it needs, is not known yet.
+    own = evidence.renoised(tried[0].fit)
+    gain = evidence.surprise(base) - own.surprise_at(with_jitter(tried[0].fit.point, own))
+    if max(gain, tried[0].gain) < 0.5 * setting('least_apart') * first:
+        return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
+    for number in range(2):
         best = tried[0]
-        evidence = evidence.renoised(best.fit)
+        evidence = own if number == 0 else evidence.renoised(best.fit)
         points = [base.point] + ([nominal] if nominal is not None else [])
         base = min((evidence.fit(with_jitter(p, evidence), base.slopes) for p in points),
                    key=lambda f: f.cost)

@@ -13,7 +13,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
-from lg_husky_sim.diagnosis.evidence.unknowns import start_of, tick_unknowns
+from lg_husky_sim.diagnosis.evidence.unknowns import loosened, start_of, tick_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, Numbers
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.elimination import eliminated, with_effects
@@ -277,14 +277,29 @@ def _nominal(point: Point) -> Point:
     return point.at(centres)
 
 
-def _settled(evidence: Evidence, point: Point) -> tuple[Evidence, Fit]:
+def _settled(evidence: Evidence, point: Point, first: Evidence) -> tuple[Evidence, Fit]:
     # The likeliest numbers and noise of an adopted structure: where they began far from the robot
-    # as it should be, since the base had absorbed the effect, from there, too.
+    # as it should be, since the base had absorbed the effect, from there, too, and from there
+    # with a log that was made as most are, under a first guess of the noise.
     found = [calibrated(evidence, point, 1)]
     if is_distorted(found[0][1]):
         start = _nominal(found[0][1].point)
         found.append(calibrated(evidence.about(start), start))
+        start = as_usual(start)
+        own, fit = calibrated(first.about(start), start)
+        found.append(_read_as(own, fit, best_reading(own, fit)))
     return min(found, key=lambda one: one[0].surprise(one[1]))
+
+
+def as_usual(point: Point) -> Point:
+    """Return a point with its effects and the robot's numbers, of a log made as most are."""
+    kept = [place for place, u in enumerate(point.unknowns) if u.name != 'imu_window']
+    unknowns = tuple(point.unknowns[place] for place in kept)
+    unknowns = loosened(unknowns, {u.name: 0.0 for u in unknowns if u.room})
+    centres = start_of(unknowns)
+    places = np.array([centres[to] if u.kind == 'log' else point.places[place]
+                       for to, (place, u) in enumerate(zip(kept, unknowns, strict=True))])
+    return replace(point, reading=Reading(), unknowns=unknowns, places=places)
 
 
 def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
@@ -360,7 +375,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             break
         found.append(best.hypothesis)
         first = rounds[0].tried[0].gain
-        evidence, base = _settled(evidence, best.fit.point)
+        evidence, base = _settled(evidence, best.fit.point, known.first)
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
             postponed = False
