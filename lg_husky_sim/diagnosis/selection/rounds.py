@@ -216,7 +216,7 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     # Which effect it will be, and so how much it needs, is not known yet.
     own = evidence.renoised(tried[0].fit)
     gain = evidence.surprise(base) - own.surprise_at(with_jitter(tried[0].fit.point, own))
-    if max(gain, tried[0].gain) < 0.5 * setting('least_apart') * first:
+    if max(gain, tried[0].gain) < setting('rough_share') * setting('least_apart') * first:
         return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     for number in range(2):
         best = tried[0]
