@@ -212,11 +212,8 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     chance = _chance(evidence, tried[0], starts) if tried else 1.0
     if chance > setting('hopeless'):
         return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
-    # Noise may have taken the place of what is missing: what it gains with noise of its own.
-    # Which effect it will be, and so how much it needs, is not known yet.
     own = evidence.renoised(tried[0].fit)
-    gain = evidence.surprise(base) - own.surprise_at(with_jitter(tried[0].fit.point, own))
-    if max(gain, tried[0].gain) < setting('rough_share') * setting('least_apart') * first:
+    if not _may_be_adopted(evidence, base, tried, own, first):
         return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     for number in range(2):
         best = tried[0]
@@ -241,6 +238,17 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     chance = 1.0 if is_negligible(best, evidence.noise.values) else _chance(
         evidence, best, starts, _once(evidence, base, best))
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
+
+
+def _may_be_adopted(evidence: Evidence, base: Fit, tried: Sequence[Tried], own: Evidence,
+                    first: float) -> bool:
+    # Whether any gains what it needs beside a first effect once the rest is fitted with it; or
+    # the best does with noise of its own, which may have taken the place of what is missing.
+    if any(t.gain >= setting('rough_share') * least_beside(t.hypothesis, first) for t in tried):
+        return True
+    best = tried[0]
+    gain = evidence.surprise(base) - own.surprise_at(with_jitter(best.fit.point, own))
+    return gain >= least_beside(best.hypothesis, first)
 
 
 def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:
