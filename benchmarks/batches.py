@@ -22,6 +22,7 @@ from lg_husky_sim.identification.unknowns import free_names, search_bounds
 from lg_husky_sim.manoeuvres import find_manoeuvre
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import FloatArray, TimeSeries
+from lg_husky_sim.simulation.compiling import compile_here
 from lg_husky_sim.simulation.events import Events, Propagator
 from lg_husky_sim.simulation.simulator import rollout
 import numpy as np
@@ -141,6 +142,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--quick', action='store_true', help='fewer repetitions')
     repetitions = 2 if parser.parse_args().quick else 8
+    compile_here()
     derivative_rows(repetitions)
     batch_rows(repetitions)
     event_rows(repetitions)

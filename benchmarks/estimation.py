@@ -30,6 +30,7 @@ from lg_husky_sim.manoeuvres import find_manoeuvre
 from lg_husky_sim.recording import Segment, segments
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation import rollout, Simulator
+from lg_husky_sim.simulation.compiling import compile_here
 from lg_husky_sim.simulation.simulator import hold
 import numba
 import numpy as np
@@ -245,6 +246,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--quick', action='store_true')
     quick = parser.parse_args().quick
+    compile_here()
     genetic_rows(quick)
     estimator_rows(quick)
     engine_rows(quick)

@@ -28,6 +28,7 @@ from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.jit import compiled, SWITCH
 from lg_husky_sim.signals import FloatArray, TimeSeries
 from lg_husky_sim.simulation import Simulator
+from lg_husky_sim.simulation.compiling import compile_here
 from lg_husky_sim.simulation.events import Events, Propagator
 import numpy as np
 import scipy.linalg
@@ -229,6 +230,7 @@ def main() -> None:
     parser.add_argument('--quick', action='store_true', help='fewer repetitions')
     parser.add_argument('--kernel-only', action='store_true', help='print the time alone')
     arguments = parser.parse_args()
+    compile_here()
     plant, values = nominal()
     if arguments.kernel_only:
         simulator, held = Simulator(plant, PERIOD), commands()

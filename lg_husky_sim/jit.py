@@ -9,13 +9,19 @@ import functools
 import importlib.util
 import os
 from pathlib import Path
+import subprocess
+import sys
 import threading
+import time
 from typing import Any, cast, TypeVar
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
 #: Environment variable: any value but '' and '0' keeps the kernel in plain Python.
 SWITCH = 'LG_HUSKY_NO_NUMBA'
+#: What calls may take in plain Python before they wait for machine code after all [s]: about as
+#: long as the compiler takes, so that no program takes more than twice what it would, had it known.
+PATIENCE = 20.0
 
 
 def compiled() -> bool:
@@ -37,58 +43,81 @@ class Kernel:
     function : callable
         Without fast-math: every operation is IEEE, in the order in which it is written, so that
         the compiled and the plain function give the same numbers.
+    compiler : str
+        Name of a module that puts the machine code on disk when it is run. Where there is none
+        yet, calls do not wait for it: they run in plain Python meanwhile, unless that takes so
+        long that they had better waited.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], compiler: str = '') -> None:
         functools.update_wrapper(self, function)
         #: The function in plain Python, with the parts that it calls.
         self.plain = function
+        self._compiler = compiler
         self._machine: Any = None
-        self._postponed = False
+        self._postponed = bool(compiler)
+        self._ready: threading.Event | None = None
         self._seen: tuple[Any, ...] = ()
+        #: What calls may still take in plain Python [s].
+        self.patience = PATIENCE
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the machine code, or plain Python while :meth:`soon` waits for it."""
+        """Call the machine code, or plain Python while that is compiled elsewhere."""
+        if self._postponed:
+            ready = self.soon()
+            if self.patience <= 0.0:
+                ready.wait()
         if self._postponed:
             if not self._seen:
                 import numba
                 # Now: an array may be read-only later, which is another type.
                 self._seen = tuple(map(numba.typeof, arguments))
-            return self.plain(*arguments)
+            began = time.thread_time()
+            try:
+                return self.plain(*arguments)
+            finally:
+                self.patience -= time.thread_time() - began
         machine = self._machine or self._made()
         return machine(*arguments)
+
+    def at_once(self) -> None:
+        """Let the first call wait until the machine code is there."""
+        self._postponed, self._compiler = False, ''
 
     def on_disk(self) -> bool:
         """Return whether there is machine code on disk, as far as can be told without a call."""
         return any(_index_files(self._made(), self.plain))
 
-    def soon(self, elsewhere: Callable[[], object]) -> threading.Event:
+    def soon(self) -> threading.Event:
         """
-        Let calls run in plain Python until machine code has been put on disk.
+        Let a process of its own put the machine code on disk, unless it is there.
 
-        Parameters
-        ----------
-        elsewhere : callable
-            Does that, in a thread of its own. Where it could not, the thread compiles.
+        Where that process could not, a thread of this one compiles.
 
         Returns
         -------
         threading.Event
             Set from when on calls run in machine code.
         """
-        self._postponed, done = True, threading.Event()
+        with _MAKING:
+            if self._ready is None:
+                self._ready = threading.Event()
+                if self._compiler and not self.on_disk():
+                    threading.Thread(target=self._load, daemon=True, name='machine code').start()
+                else:
+                    self._postponed = False
+                    self._ready.set()
+            return self._ready
 
-        def load() -> None:
-            try:
-                elsewhere()
-                if self._seen:
-                    self._made().compile(self._seen)
-            finally:
-                self._postponed, self._seen = False, ()
-                done.set()
-
-        threading.Thread(target=load, daemon=True, name='machine code').start()
-        return done
+    def _load(self) -> None:
+        try:
+            compile_elsewhere(self._compiler)
+            if self._seen:
+                self._made().compile(self._seen)
+        finally:
+            self._postponed, self._seen = False, ()
+            if self._ready is not None:
+                self._ready.set()
 
     @property
     def _numba_type_(self) -> Any:
@@ -112,12 +141,27 @@ class Kernel:
         return self._machine
 
 
+def compile_elsewhere(module: str) -> None:
+    """Run a module that compiles; it ends with this process, too: its standard input then does."""
+    with subprocess.Popen([sys.executable, '-m', module],  # noqa: S603 (our own)
+                          stdin=subprocess.PIPE,
+                          stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        process.wait()
+
+
 def jit(function: Function) -> Function:
     """Return a function as a :class:`Kernel` where numba is used, and else as it is."""
-    if not compiled():
-        return function
-    _remember_source(function)
-    return cast(Function, Kernel(function))
+    return jit_by('')(function)
+
+
+def jit_by(compiler: str) -> Callable[[Function], Function]:
+    """Return a decorator like :func:`jit` for a kernel that the named module compiles."""
+    def decorate(function: Function) -> Function:
+        if not compiled():
+            return function
+        _remember_source(function)
+        return cast(Function, Kernel(function, compiler))
+    return decorate
 
 
 def jit_part(function: Function) -> Function:

@@ -9,9 +9,8 @@ Both give the same numbers, bit for bit, so that nothing tells when the machine 
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 import os
-import subprocess
-import sys
 import threading
 import time
 
@@ -42,25 +41,21 @@ def make_ready(step: Callable[[], object], longest: float) -> bool:
     bool
         Whether steps are made in plain Python for now.
     """
-    if not isinstance(follow, Kernel) or follow.on_disk():
+    if not isinstance(follow, Kernel):
         step()
         return False
-    done = follow.soon(_compile_elsewhere)
+    # Who steps with a clock must not be stopped in between.
+    follow.patience = math.inf
+    ready = follow.soon()
     step()
+    if ready.is_set():
+        return False
     began = time.thread_time()
     step()
     if time.thread_time() - began > longest:
-        done.wait()
+        ready.wait()
         step()
-    return not done.is_set()
-
-
-def _compile_elsewhere() -> None:
-    # It ends with this process, too: its standard input then does.
-    with subprocess.Popen([sys.executable, '-m', 'lg_husky_sim.simulation.compiling'],
-                          stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
-                          stderr=subprocess.DEVNULL) as process:
-        process.wait()
+    return not ready.is_set()
 
 
 def _end_with_parent() -> None:
@@ -70,13 +65,15 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def main() -> None:
-    """Compile, and leave the machine code on disk."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+def compile_here() -> None:
+    """Compile unless that was done before, and leave the machine code on disk."""
+    if isinstance(follow, Kernel):
+        follow.at_once()
     model = load_model()
     simulator = Simulator(compile_model(model.structure).at(model.parameters), 0.02)
     simulator.step(simulator.initial(), BodyTwist())
 
 
 if __name__ == '__main__':
-    main()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    compile_here()

@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 
 from lg_husky_sim.husky.laws import MEMORY as MEMORIES
-from lg_husky_sim.jit import jit, jit_call, jit_part
+from lg_husky_sim.jit import jit_by, jit_call, jit_part
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.arrays import (
     ACCELERATION,
@@ -178,7 +178,7 @@ def _leave(s: FloatArray, n: int, t: float, few: FloatArray) -> None:
         s[n + 7 + i] = few[MEMORY, i]
 
 
-@jit
+@jit_by('lg_husky_sim.simulation.compiling')
 def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatArray,
            places: NDArray[np.int64], out: FloatArray, ends: FloatArray, fine: bool,
            plant: Packed, work: Work) -> int:
