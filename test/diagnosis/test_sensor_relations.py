@@ -172,6 +172,7 @@ def test_a_shift_of_the_whole_bag_changes_no_relation(clean: Recording) -> None:
 
 def test_a_deflated_wheel_is_still_this_robot_and_one_twice_as_large_is_not(
         clean: Recording) -> None:
+    """Wheels that roll less may slip: a fit has to say whether this robot's could."""
     parameters = load_model().parameters
 
     def differs(factor: float) -> bool:
@@ -180,7 +181,8 @@ def test_a_deflated_wheel_is_still_this_robot_and_one_twice_as_large_is_not(
     assert not differs(0.9)
     assert not differs(1.1)
     assert differs(2.0)
-    assert differs(0.5)
+    assert not differs(0.5)
+    assert differs(0.05)
 
 
 def test_a_stretch_with_one_reading_of_the_wheels_says_nothing(clean: Recording) -> None:
@@ -193,35 +195,33 @@ def test_a_stretch_with_one_reading_of_the_wheels_says_nothing(clean: Recording)
     assert both == one
 
 
+@pytest.mark.parametrize('damping', [1.3, 0.7])
 def test_tyres_that_slip_by_a_resistance_are_no_smaller_wheels(
-        record: Make, steps: Sequence[tuple[float, float, float]]) -> None:
-    """The robot lags behind its wheels by the same at every speed."""
+        record: Make, steps: Sequence[tuple[float, float, float]], damping: float) -> None:
+    """However far the robot lags behind its wheels."""
     model, effect = load_model(), Effect('rolling_resistance')
-    radius = model.parameters['wheel_radius']
     plant = compile_model(model.structure.with_effect(effect)).at(model.parameters.replacing({
-        'wheel_damping': 1.3}).with_entries(*entries_of(effect, {'rolling_force': 60.0})))
+        'wheel_damping': damping}).with_entries(*entries_of(effect, {'rolling_force': 60.0})))
     related = relations(segments(record('slips', plant, steps, 3)))
     speed = by_names(related)['speed', 'wheels', 'pose']
-    assert speed.factor.value < 0.6 * radius
-    assert speed.rolling is not None
-    assert speed.rolling.value == pytest.approx(radius, rel=0.1)
+    assert speed.factor.value < 0.6 * model.parameters['wheel_radius']
     assert differences(related, model.parameters) == ()
 
 
 @pytest.mark.parametrize(('name', 'value', 'impossible_'), [
     ('payload_mass', 30.0, False), ('payload_mass', 300.0, True), ('mass', 60.0, False),
-    ('mass', 200.0, True)])
-def test_a_payload_of_hundreds_of_kilograms_is_another_robot(name: str, value: float,
-                                                             impossible_: bool) -> None:
+    ('mass', 200.0, True), ('wheel_radius', 0.15, False), ('wheel_radius', 0.09, True)])
+def test_a_fit_with_numbers_that_no_such_robot_has_is_of_another_robot(
+        name: str, value: float, impossible_: bool) -> None:
     model = load_model()
     payload = Effect('payload')
     numbers = model.parameters.with_entries(
         *(p.parameter() for p in payload.parameters())).replacing({name: value})
-    entry = model.parameters.entry('mass')
+    entry = model.parameters.entry(name if name in model.parameters else 'mass')
     unknowns = (model_unknown(entry), *effect_unknowns(payload, {
         p.name: numbers[p.name] for p in payload.parameters()}))
-    residuals = np.array([np.log(numbers['mass'] / entry.value) / entry.tolerance] + [0.0] * (
-        len(unknowns) - 1))
+    residuals = np.array([np.log(numbers[entry.name] / entry.value) / entry.tolerance]
+                         + [0.0] * (len(unknowns) - 1))
     fit: Any = SimpleNamespace(point=SimpleNamespace(
         unknowns=unknowns, prior_residuals=residuals, numbers=numbers))
     assert bool(impossible(fit, model.parameters)) is impossible_

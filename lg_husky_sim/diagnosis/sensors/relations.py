@@ -8,16 +8,13 @@ Two streams that see the same motion are related over any window [a, b] by::
     change of the reference = factor * (change of the source, late by d) + offset * (b - a)
 
 A gyro and the heading of a pose see the same yaw rate, with a factor of one. Wheels see the speed
-with their rolling radius as the factor, and the yaw rate with that over the effective track. Where
-tyres slip in proportion to what they push, a resistance that is the same at every speed takes as
-much from the speed in either direction.
+with their rolling radius as the factor, and the yaw rate with that over the effective track.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-import math
+from dataclasses import dataclass
 from types import MappingProxyType
 
 from lg_husky_sim.diagnosis.sensors.regression import Number, regression, Way
@@ -25,7 +22,6 @@ from lg_husky_sim.diagnosis.sensors.ways import (
     advance,
     gyro,
     heading,
-    mean_direction,
     mean_wheel,
     wheel_difference,
 )
@@ -56,9 +52,6 @@ class Relation:
         Longest of the two streams' usual intervals [s].
     seconds : float
         That were compared.
-    rolling : Number or None
-        Of a speed, the factor where the reference is less by the same at every speed; None where
-        that cannot be told, and for other quantities.
     """
 
     quantity: str
@@ -70,7 +63,6 @@ class Relation:
     explained: float
     interval: float
     seconds: float
-    rolling: Number | None = None
 
 
 #: What is compared: quantity, source, reference, and the integrals of both.
@@ -99,18 +91,8 @@ def relations(parts: Sequence[Segment]) -> tuple[Relation, ...]:
     for quantity, source, reference, own, other in _PAIRS:
         one = _relation(parts, quantity, (source, reference), own, other)
         if one is not None:
-            found.append(one if quantity != 'speed' else replace(one, rolling=_rolling(parts)))
+            found.append(one)
     return tuple(found)
-
-
-def _rolling(parts: Sequence[Segment]) -> Number | None:
-    pairs = [(reference, (source, direction)) for part in parts
-             if (source := mean_wheel(part)) is not None
-             and (direction := mean_direction(part)) is not None
-             and (reference := advance(part)) is not None]
-    found = regression(pairs, (setting('least_wheel_motion'), 0.0), offset=False)
-    return None if found is None or not all(
-        math.isfinite(one.value) for one in found.factors) else found.factors[0]
 
 
 def _relation(parts: Sequence[Segment], quantity: str, names: tuple[str, str],

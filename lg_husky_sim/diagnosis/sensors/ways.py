@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from lg_husky_sim.diagnosis.evidence.drives import are_derived
 from lg_husky_sim.diagnosis.sensors.regression import Way
-from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.recording.wheels import unwrapped
 from lg_husky_sim.signals import FloatArray
@@ -63,12 +62,3 @@ def mean_wheel(part: Segment) -> Way | None:
     """Return the mean angle of the wheels [rad]."""
     wheels = wheel_angles(part)
     return None if wheels is None else (wheels[0], wheels[1].mean(axis=1))
-
-
-def mean_direction(part: Segment) -> Way | None:
-    """Return for how much longer the wheels have turned forwards than backwards [s]."""
-    wheels = mean_wheel(part)
-    if wheels is None or wheels[0].size < 2:
-        return None
-    rates = np.gradient(wheels[1], wheels[0])
-    return integral(wheels[0], np.clip(rates / setting('least_wheel_motion'), -1.0, 1.0))
