@@ -19,8 +19,8 @@ Function = TypeVar('Function', bound=Callable[..., Any])
 
 #: Environment variable: any value but '' and '0' keeps the kernel in plain Python.
 SWITCH = 'LG_HUSKY_NO_NUMBA'
-#: What calls may take in plain Python before they wait for machine code after all [s]: about as
-#: long as the compiler takes, so that no program takes more than twice what it would, had it known.
+#: What calls may take in plain Python before they wait for machine code after all [s]: about what
+#: the compiler takes, so that no program takes twice as long as one that had waited at once.
 PATIENCE = 20.0
 
 
