@@ -282,7 +282,6 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
             rates = (left, right)
     yaw, forward = 0.0, 0.0
     heading = np.zeros(0)
-    place = Pose()
     if imu is not None and len(imu) > 3:
         pieces.append((Channel.YAW_RATE, imu.times, imu.column('yaw_rate')))
         yaw = _early(imu, start, ('yaw_rate',))[0]
@@ -291,16 +290,14 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
         heading = smoothed(pose.times, raw, setting('heading_smoothing'))
         pieces += [(Channel.X, pose.times, pose.column('x')),
                    (Channel.Y, pose.times, pose.column('y')), (Channel.HEADING, pose.times, raw)]
-        few = min(len(pose), 5)
-        place = Pose(float(np.median(pose.column('x')[:few])),
-                     float(np.median(pose.column('y')[:few])), float(heading[0]))
         late = int(np.searchsorted(pose.times, pose.times[0] + 2.0 * setting('start_window')))
         late = min(max(late, 1), len(pose) - 1)
         span = float(pose.times[late] - pose.times[0])
         if span > 0.0:
-            along = ((pose.column('x')[late] - place.x) * np.cos(heading[0])
-                     + (pose.column('y')[late] - place.y) * np.sin(heading[0]))
-            forward = float(along / span)
+            middle = 0.5 * (heading[1:late + 1] + heading[:late])
+            ahead = (np.cos(middle) * np.diff(pose.column('x')[:late + 1])
+                     + np.sin(middle) * np.diff(pose.column('y')[:late + 1]))
+            forward = _slope(pose.times[:late + 1], np.concatenate([[0.0], np.cumsum(ahead)]))
             yaw = yaw if imu is not None else float((heading[late] - heading[0]) / span)
     if not pieces:
         return None
@@ -308,10 +305,13 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
     pieces.sort(key=lambda piece: int(piece[0]))
     still = at_rest(BodyTwist(forward, yaw), rates) if rates is not None else at_rest(
         BodyTwist(forward, yaw))
+    twist = BodyTwist() if still else BodyTwist(forward, yaw)
+    place = Pose() if heading.size == 0 or pose is None else _begun(pose, heading, start, twist)
     begin = (0.0, 0.0)
     if counted and turning is not None:
-        begin = (float(unwrapped(turning.column('left'))[0]),
-                 float(unwrapped(turning.column('right'))[0]))
+        left, right = (_first(turning.times, unwrapped(turning.column(side)), start, still)
+                       for side in ('left', 'right'))
+        begin = (left, right)
     elif angles is not None and len(angles):
         begin = (float(np.interp(start, angles.times, unwrapped(angles.column('left')))),
                  float(np.interp(start, angles.times, unwrapped(angles.column('right')))))
@@ -323,9 +323,33 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
         np.concatenate([v for _, _, v in pieces]),
         np.concatenate([np.full(t.size, int(c), dtype=np.int64) for c, t, _ in pieces]),
         np.concatenate([t for _, t, _ in pieces]), heading, place,
-        BodyTwist() if still else BodyTwist(forward, yaw), (0.0, 0.0) if still else rates,
+        twist, (0.0, 0.0) if still else rates,
         begin, still, stamped, logged=streams['command'],
         rounding=np.concatenate([_rounding(v) for _, _, v in pieces]))
+
+
+def _slope(times: FloatArray, values: FloatArray) -> float:
+    since = times - np.mean(times)
+    return float(since @ values / (since @ since))
+
+
+def _begun(pose: TimeSeries, heading: FloatArray, start: float, twist: BodyTwist) -> Pose:
+    # Where a drive begins: its first few poses less what the robot has moved until then.
+    few = slice(0, min(len(pose), 5))
+    since = pose.times[few] - start
+    way, middle = twist.forward * since, heading[few] - 0.5 * twist.yaw * since
+    return Pose(float(np.median(pose.column('x')[few] - way * np.cos(middle))),
+                float(np.median(pose.column('y')[few] - way * np.sin(middle))),
+                float(heading[0] - twist.yaw * since[0]))
+
+
+def _first(times: FloatArray, angles: FloatArray, start: float, still: bool) -> float:
+    # The angle of a wheel at the start, of its first readings.
+    few = int(np.searchsorted(times, times[0] + setting('start_window')))
+    if still or few < 2:
+        return float(angles[0])
+    return float(np.mean(angles[:few]) - _slope(times[:few], angles[:few]) * (
+        np.mean(times[:few]) - start))
 
 
 def _remembering(drive: Drive, commands: TimeSeries) -> Drive:
