@@ -20,6 +20,7 @@ import pytest
 SHORT = Manoeuvre('short', (Step(0.2, 0.0, 0.0), Step(1.2, 0.5, 0.3), Step(0.6, 0.0, 0.0)))
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_a_driven_recording_can_be_read_and_summed_up(
         probe: Probe, start: Callable[..., LiveHusky], tmp_path: Path, storage: str) -> None:
