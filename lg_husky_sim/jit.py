@@ -9,6 +9,7 @@ import functools
 import importlib.util
 import os
 from pathlib import Path
+import signal
 import subprocess
 import sys
 import threading
@@ -22,6 +23,8 @@ SWITCH = 'LG_HUSKY_NO_NUMBA'
 #: What calls may take in plain Python before they wait for machine code after all [s]: about what
 #: the compiler takes, so that no program takes twice as long as one that had waited at once.
 PATIENCE = 20.0
+#: How a process ends that was told to stop, as all of a terminal are by Ctrl-C.
+_STOPPED = (-signal.SIGINT, -signal.SIGTERM)
 
 
 def compiled() -> bool:
@@ -67,6 +70,8 @@ class Kernel:
             ready = self.soon()
             if self.patience <= 0.0:
                 ready.wait()
+                if self._postponed:
+                    raise KeyboardInterrupt
         if self._postponed:
             if not self._seen:
                 import numba
@@ -103,21 +108,27 @@ class Kernel:
             if self._ready is None:
                 self._ready = threading.Event()
                 if self._compiler and not self.on_disk():
-                    threading.Thread(target=self._load, daemon=True, name='machine code').start()
+                    threading.Thread(target=self._load, args=(self._ready,), daemon=True,
+                                     name='machine code').start()
                 else:
                     self._postponed = False
                     self._ready.set()
             return self._ready
 
-    def _load(self) -> None:
+    def _load(self, ready: threading.Event) -> None:
+        stopped = False
         try:
-            compile_elsewhere(self._compiler)
-            if self._seen:
+            stopped = compile_elsewhere(self._compiler) in _STOPPED
+            if self._seen and not stopped:
                 self._made().compile(self._seen)
         finally:
-            self._postponed, self._seen = False, ()
-            if self._ready is not None:
-                self._ready.set()
+            if stopped:
+                # Who waits is stopped, too; a later call begins anew.
+                self._ready, self.patience = None, max(self.patience, PATIENCE)
+            else:
+                self._postponed = False
+            self._seen = ()
+            ready.set()
 
     @property
     def _numba_type_(self) -> Any:
@@ -141,12 +152,12 @@ class Kernel:
         return self._machine
 
 
-def compile_elsewhere(module: str) -> None:
-    """Run a module that compiles; it ends with this process, too: its standard input then does."""
+def compile_elsewhere(module: str) -> int:
+    """Run a module that compiles, return how it ended; at the latest with its standard input."""
     with subprocess.Popen([sys.executable, '-m', module],  # noqa: S603 (our own)
                           stdin=subprocess.PIPE,
                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        process.wait()
+        return process.wait()
 
 
 def jit(function: Function) -> Function:

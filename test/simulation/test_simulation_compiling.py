@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import signal
 import subprocess
 import sys
 import threading
@@ -100,6 +101,22 @@ def test_who_has_called_for_long_waits(gate: threading.Event) -> None:
     threading.Timer(0.2, gate.set).start()
     assert kernel(0.7, 3) == expected
     assert gate.is_set()
+
+
+def test_who_waits_is_stopped_with_the_compiler_and_later_calls_begin_anew(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C reaches both; nothing is compiled here then, for as long as that takes."""
+    monkeypatch.setattr(Kernel, 'on_disk', lambda _: False)
+    ends, stop = iter([-signal.SIGINT, 0]), threading.Event()
+    monkeypatch.setattr(jit_module, 'compile_elsewhere', lambda _: stop.wait(60.0) and next(ends))
+    kernel = fresh()
+    kernel.patience = 0.0
+    threading.Timer(0.2, stop.set).start()
+    with pytest.raises(KeyboardInterrupt):
+        kernel(0.7, 3)
+    assert kernel(0.7, 3) == kernel.plain(0.7, 3)
+    assert kernel.soon().wait(60.0)
+    assert next(ends, None) is None
 
 
 def test_somebody_who_compiles_waits_for_it() -> None:
