@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.diagnosis.selection.screening import look, Projection
+from lg_husky_sim.diagnosis.selection.screening import look, problems_of, Projection
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
@@ -67,7 +67,11 @@ def test_products_are_those_of_columns_without_what_the_base_explains(
     wanted, pulled = _least_squares(fit, columns)
     np.testing.assert_allclose(normal, wanted, rtol=1e-8, atol=1e-8 * np.max(wanted))
     np.testing.assert_allclose(slope, pulled, rtol=1e-7, atol=1e-8 * np.max(np.abs(pulled)))
-    normals, slopes = Projection(fit).problems(columns, 2)
+    first = evidence.drives[0].measured.size // 3
+    halves = [Projection(fit).products(columns[some].reshape(-1, 2, 3), top)
+              for some, top in ((slice(first), 0), (slice(first, None), first))]
+    explained, with_target, with_each_other = (a + b for a, b in zip(*halves, strict=True))
+    normals, slopes = problems_of((explained, with_target, with_each_other))
     for place in range(3):
         own = [place, place + 3]
         np.testing.assert_allclose(normals[place], normal[np.ix_(own, own)], rtol=1e-9)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
@@ -18,6 +19,8 @@ from lg_husky_sim.diagnosis.selection.screening import (
     gain_of,
     limits_of,
     Look,
+    problems_of,
+    Products,
     Projection,
 )
 from lg_husky_sim.diagnosis.settings import setting
@@ -25,6 +28,7 @@ from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 
 def onsets_of(evidence: Evidence) -> list[Onset]:
@@ -91,30 +95,43 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
             if changes is None:
                 continue
             limits = limits_of(hypothesis, group)
-            width = max(1, int(setting('onset_batch')) // (evidence.count * len(group)))
-            for first in range(0, len(onsets), width):
-                some = slice(first, first + width)
-                columns = _columns(evidence, changes, [on[:, some] for on in patterns])
-                for onset, normal, slope in zip(
-                        onsets[some], *projection.problems(columns, len(group)), strict=True):
-                    gain, coefficients = gain_of(normal, slope, limits)
-                    if gain > (0.0 if best is None else best.gain):
-                        at = hypothesis.at(onset)
-                        best = Look(at, begin(at, group, coefficients), gain)
+            problems = problems_of(_products(projection, evidence, changes, patterns))
+            for onset, normal, slope in zip(onsets, *problems, strict=True):
+                gain, coefficients = gain_of(normal, slope, limits)
+                if gain > (0.0 if best is None else best.gain):
+                    at = hypothesis.at(onset)
+                    best = Look(at, begin(at, group, coefficients), gain)
         return best
     open_ones = [h for h in pool if not h.effect.always_on and h.effect.shape != 'grip']
     return [one for one in evidence.pool.map(best_of, open_ones) if one is not None]
 
 
+@dataclass(frozen=True, eq=False)
+class _Patterns:
+    """
+    When an effect acts in one drive.
+
+    Parameters
+    ----------
+    different : numpy.ndarray of uint8, shape (n, k)
+        Whether it acts at each reading, in the order of time.
+    place : numpy.ndarray of int, shape (m,)
+        Which of the k columns each onset has.
+    """
+
+    different: NDArray[np.uint8]
+    place: NDArray[np.intp]
+
+
 def _patterns(evidence: Evidence, drive: Drive, motion: Motion, times: FloatArray,
-              onsets: Sequence[Onset]) -> np.typing.NDArray[np.uint8]:
-    # Whether an effect acts at each reading, one column an onset.
+              onsets: Sequence[Onset]) -> _Patterns:
+    # In another recording than its own, an onset is like any other there.
     names = list(evidence.names)
     at = names.index(drive.recording)
     place = (np.interp(times, drive.pose_times, drive.measured[drive.slice_of(Channel.X)])
              if drive.pose_times.size else
              np.interp(times, probe_times(drive), motion.column('x', 'probe')))
-    found = np.zeros((times.size, len(onsets)), dtype=np.uint8)
+    found: NDArray[np.uint8] = np.zeros((times.size, len(onsets)), dtype=np.uint8)
     for k, onset in enumerate(onsets):
         match onset.kind:
             case OnsetKind.TIME:
@@ -124,7 +141,8 @@ def _patterns(evidence: Evidence, drive: Drive, motion: Motion, times: FloatArra
                 found[:, k] = place >= onset.value
             case OnsetKind.PLACE_BELOW:
                 found[:, k] = place <= onset.value
-    return found
+    different, place_of = np.unique(found, axis=1, return_inverse=True)
+    return _Patterns(different, place_of.reshape(-1))
 
 
 def _changes(evidence: Evidence, base: Fit, motions: Sequence[Motion], hypothesis: Hypothesis,
@@ -148,19 +166,27 @@ def _changes(evidence: Evidence, base: Fit, motions: Sequence[Motion], hypothesi
     return found
 
 
-def _columns(evidence: Evidence, changes: Sequence[Sequence[tuple[FloatArray, FloatArray]]],
-             patterns: Sequence[np.typing.NDArray[np.uint8]]) -> FloatArray:
-    # Whitened changes, shape (n, numbers * onsets).
-    width = patterns[0].shape[1]
-    columns = np.empty((evidence.count, len(changes) * width))
-    for number, parts in enumerate(changes):
-        top = 0
-        for (change, built_up), whitener, on in zip(
-                parts, evidence.whiteners, patterns, strict=True):
-            columns[top:top + len(on), number * width:(number + 1) * width] = whitener.switched(
-                change, built_up, np.ascontiguousarray(on))
-            top += len(on)
-    return columns
+def _products(projection: Projection, evidence: Evidence,
+              changes: Sequence[Sequence[tuple[FloatArray, FloatArray]]],
+              patterns: Sequence[_Patterns]) -> Products:
+    # Of the whitened changes, one set an onset.
+    total: list[FloatArray] = []
+    top = 0
+    for number, (whitener, own) in enumerate(zip(evidence.whiteners, patterns, strict=True)):
+        count, width = own.different.shape
+        batch = max(1, int(setting('onset_batch')) // (count * len(changes)))
+        parts = []
+        for first in range(0, width, batch):
+            on = np.ascontiguousarray(own.different[:, first:first + batch])
+            columns = np.empty((count, len(changes), on.shape[1]))
+            for i, of_number in enumerate(changes):
+                columns[:, i] = whitener.switched(*of_number[number], on)
+            parts.append(projection.products(columns, top))
+        sums = [np.concatenate(some, axis=-1)[..., own.place]
+                for some in zip(*parts, strict=True)]
+        total = [a + b for a, b in zip(total, sums, strict=True)] if total else sums
+        top += count
+    return total[0], total[1], total[2]
 
 
 def _built_up(drive: Drive, motion: Motion, before: Motion, change: FloatArray, frame: Frame

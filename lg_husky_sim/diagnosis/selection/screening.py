@@ -28,6 +28,9 @@ from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
+#: Of columns with the base, with the innovations and with each other.
+Products = tuple[FloatArray, FloatArray, FloatArray]
+
 
 @dataclass(frozen=True, eq=False)
 class Look:
@@ -96,40 +99,59 @@ class Projection:
             found[some] -= (self._base.T[some] / self._weights[some, None]) @ explained
         return found
 
-    def problems(self, columns: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
+    def products(self, columns: FloatArray, top: int) -> Products:
         """
-        Return the normal equations of many sets of columns at once.
+        Return the products of many sets of columns with the base and with each other.
 
         Parameters
         ----------
-        columns : numpy.ndarray, shape (n, size * m)
-            Whitened changes: the first column of all m sets, then the second of all, and so on.
-        size : int
-            Columns of a set.
+        columns : numpy.ndarray, shape (n, size, m)
+            Whitened changes of some readings, m sets of them.
+        top : int
+            Which reading of the base is the first of them.
 
         Returns
         -------
-        normal : numpy.ndarray, shape (m, size, size)
-        slope : numpy.ndarray, shape (m, size)
+        tuple of numpy.ndarray, shapes (k, size, m), (size, m), (size, size, m)
+            They add up over the readings.
         """
-        count = columns.shape[1] // size
-        explained = np.zeros((len(self._base), columns.shape[1]))
-        slope, normal = np.zeros(columns.shape[1]), np.zeros((size, size, count))
-        for some in row_slices(len(columns)):
+        count, size, sets = columns.shape
+        explained = np.zeros((len(self._base), size * sets))
+        slope, normal = np.zeros(size * sets), np.zeros((size, size, sets))
+        for some in row_slices(count):
             own = columns[some]
-            explained += self._base[:, some] @ own
-            slope += self._target[some] @ own
-            weighted = (own * self._weights[some, None]).reshape(-1, size, count)
-            whole = own.reshape(-1, size, count)
+            flat, rows = own.reshape(len(own), -1), slice(top + some.start,
+                                                          top + some.start + len(own))
+            explained += self._base[:, rows] @ flat
+            slope += self._target[rows] @ flat
+            weighted = own * self._weights[rows, None, None]
             for i in range(size):
                 for j in range(i + 1):
-                    normal[i, j] += np.einsum('nm,nm->m', weighted[:, i], whole[:, j])
-        done = explained.reshape(-1, size, count)
-        for i in range(size):
-            for j in range(i + 1):
-                normal[i, j] -= np.einsum('km,km->m', done[:, i], done[:, j])
-                normal[j, i] = normal[i, j]
-        return normal.transpose(2, 0, 1), slope.reshape(size, count).T
+                    normal[i, j] += np.einsum('nm,nm->m', weighted[:, i], own[:, j])
+        return explained.reshape(-1, size, sets), slope.reshape(size, sets), normal
+
+
+def problems_of(products: Products) -> tuple[FloatArray, FloatArray]:
+    """
+    Return the normal equations of many sets of columns.
+
+    Parameters
+    ----------
+    products : tuple of numpy.ndarray
+        Over all readings, see :meth:`Projection.products`.
+
+    Returns
+    -------
+    normal : numpy.ndarray, shape (m, size, size)
+    slope : numpy.ndarray, shape (m, size)
+    """
+    explained, slope, products_of_two = products
+    normal = np.array(products_of_two)
+    for i in range(len(slope)):
+        for j in range(i + 1):
+            normal[i, j] -= np.einsum('km,km->m', explained[:, i], explained[:, j])
+            normal[j, i] = normal[i, j]
+    return normal.transpose(2, 0, 1), slope.T
 
 
 def gain_of(normal: FloatArray, slope: FloatArray, limits: Sequence[tuple[float, float]]
