@@ -100,20 +100,20 @@ class Propagator:
         """Return a flat state to start from, as :meth:`InitialStates.flat` says."""
         return self._starts.flat(pose, twist, time, wheel_rates, wheel_angles, command)
 
-    def rates_without_slip(self, twist: BodyTwist) -> tuple[float, float]:
-        """Return the wheel rates [rad/s] at which the wheels' dampers carry no torque."""
-        return self._starts.rates_without_slip(twist)
+    def twist_without_slip(self, left: float, right: float) -> BodyTwist:
+        """Return the velocity of the base whose wheels turn at such rates [rad/s]."""
+        return self._starts.twist_without_slip(left, right)
 
-    def run_in(self, commands: TimeSeries, begin: FloatArray, start: FloatArray) -> FloatArray:
+    def run_in(self, events: Events, begin: FloatArray, start: FloatArray) -> FloatArray:
         """
         Return a flat state to start from after some commands.
 
         Parameters
         ----------
-        commands : TimeSeries
-            Before the start, as of :class:`Events`.
+        events : Events
+            Of commands before the start; their only time is that of the start.
         begin : numpy.ndarray, shape (n + TAIL,)
-            Flat state at the first of them.
+            Flat state where they start.
         start : numpy.ndarray, shape (n + TAIL,)
             What is known of the start, with its time.
 
@@ -122,8 +122,6 @@ class Propagator:
         numpy.ndarray, shape (n + TAIL,)
             As of :meth:`InitialStates.run_in`.
         """
-        place = len(self.plant.states) + 6
-        events = Events(commands, start[place:place + 1], start=float(begin[place]))
         flat = np.array(begin)
         run_kernel(flat, events.stamps, events.values, events.times, events.places,
                    np.empty((1, len(COLUMNS))), events.end, False, self.packed)

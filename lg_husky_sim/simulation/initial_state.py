@@ -31,6 +31,29 @@ class InitialStates:
         return np.asarray(np.linalg.lstsq(-self._set.a, self._set.b, rcond=None)[0],
                           dtype=np.float64)
 
+    @cached_property
+    def _gains(self) -> FloatArray:
+        # Wheel rates, speed and yaw rate per volt of steady driving.
+        found: FloatArray = self._set.rows[:4] @ self.steady
+        return found
+
+    @cached_property
+    def _nearest(self) -> FloatArray:
+        # States of the steady drive that comes nearest to wheel rates, speed and yaw rate.
+        found: FloatArray = self.steady @ _inverse(self._gains)
+        return found
+
+    @cached_property
+    def _onto(self) -> FloatArray:
+        # The least change of states that changes wheel rates, speed and yaw rate.
+        return _inverse(self._set.rows[:4])
+
+    @cached_property
+    def _without_slip(self) -> tuple[float, float]:
+        # Wheel rates per speed, and their difference per yaw rate.
+        left, right = self.rates_without_slip(BodyTwist(0.0, 1.0))
+        return sum(self.rates_without_slip(BodyTwist(1.0, 0.0))) / 2.0, right - left
+
     def flat(self, pose: Pose | None = None, twist: BodyTwist | None = None, time: float = 0.0,
              wheel_rates: tuple[float, float] | None = None,
              wheel_angles: tuple[float, float] = (0.0, 0.0),
@@ -67,9 +90,7 @@ class InitialStates:
         if np.any(wanted):
             # The nearest steady drive, so that controllers and belts start where they would be,
             # and the least change that makes it agree with what is wanted.
-            nearest = self.steady @ np.linalg.lstsq(one.rows[:4] @ self.steady, wanted,
-                                                    rcond=None)[0]
-            flat[:n] = self._moved_to(nearest, wanted)
+            flat[:n] = self._moved_to(self._nearest @ wanted, wanted)
         flat[n:n + 2] = wheel_angles
         flat[n + 3:n + 7] = pose.heading, pose.x, pose.y, time
         if command is not None:
@@ -106,8 +127,7 @@ class InitialStates:
 
     def _moved_to(self, states: FloatArray, wanted: FloatArray) -> FloatArray:
         # With the least change that makes wheel rates, speed and yaw rate those that are wanted.
-        rows = self._set.rows[:4]
-        found: FloatArray = states + np.linalg.lstsq(rows, wanted - rows @ states, rcond=None)[0]
+        found: FloatArray = states + self._onto @ (wanted - self._set.rows[:4] @ states)
         return found
 
     def rates_without_slip(self, twist: BodyTwist) -> tuple[float, float]:
@@ -116,7 +136,7 @@ class InitialStates:
         rates = np.array([twist.forward * one.command.volts_per_speed
                           + sign * twist.yaw * one.command.volts_per_rate
                           for sign in (-1.0, 1.0)])
-        gains = one.rows[:4] @ self.steady
+        gains = self._gains
         body = gains[2:] @ rates
         share = [twist.forward / body[0] if body[0] else 1.0,
                  twist.yaw / body[1] if body[1] else 1.0]
@@ -124,3 +144,14 @@ class InitialStates:
         left, right = gains[:2] @ np.array([share[0] * mean - share[1] * half,
                                             share[0] * mean + share[1] * half])
         return float(left), float(right)
+
+    def twist_without_slip(self, left: float, right: float) -> BodyTwist:
+        """Return the velocity of the base whose wheels turn at such rates [rad/s]."""
+        ahead, turning = self._without_slip
+        return BodyTwist(0.5 * (left + right) / ahead, (right - left) / turning)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    # Of least squares, with what is a rounding error taken for zero.
+    return np.asarray(np.linalg.pinv(matrix, rcond=max(matrix.shape) * np.finfo(float).eps),
+                      dtype=np.float64)

@@ -29,6 +29,7 @@ from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 from scipy.sparse import csc_matrix, identity
 from scipy.sparse.linalg import spsolve
 
@@ -216,7 +217,7 @@ def _promising(steps: Sequence[Steps]) -> FloatArray:
     longest = max(float(np.ptp(one.stamps)) for one in steps)
     # Of stamps on a grid that is fine for the shortest period; lines as near as drives tell apart.
     grid = setting('clock_shortest') / setting('clock_grid')
-    count = int(np.ceil(5.0 * longest / grid))
+    count = next_fast_len(int(np.ceil(5.0 * longest / grid)), real=True)
     first = int(np.ceil(grid * count / setting('clock_longest')))
     last = int(grid * count / setting('clock_shortest'))
     rates = np.arange(first, last) / (grid * count)

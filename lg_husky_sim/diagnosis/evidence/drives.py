@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import enum
-from threading import Lock
-from typing import Any, TypeVar
+from functools import cached_property
+from itertools import pairwise
 
+from lg_husky_sim.diagnosis.evidence.memory import Memory
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.recording import Recording, Segment, segments
@@ -19,9 +20,6 @@ from lg_husky_sim.simulation.starting import at_rest
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
-
-Kept = TypeVar('Kept')
-_KEEPING = Lock()
 
 
 class Channel(enum.IntEnum):
@@ -106,6 +104,8 @@ class Drive:
     jitter : mapping of str to float
         Standard deviation of the logged stamps of a stream from the even ones that took their
         place [s]; empty where none did.
+    memory : Memory
+        What was worked out about this drive.
     """
 
     recording: str
@@ -132,6 +132,7 @@ class Drive:
     clock: Clock | None = None
     earlier: TimeSeries | None = None
     jitter: Mapping[str, float] = field(default_factory=dict)
+    memory: Memory = field(default_factory=Memory, init=False, repr=False)
 
     @property
     def name(self) -> str:
@@ -148,38 +149,15 @@ class Drive:
         """Name of how much later than in other recordings commands act in that of this drive."""
         return f'lag {self.recording}'
 
-    def remembered(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
-        """Return what was made of this drive under a key, among the last few; else make it."""
-        memory: dict[Hashable, Any] = self.__dict__.setdefault('_memory', {})
-        if key not in memory:
-            made = make()
-            while len(memory) >= 8:
-                memory.pop(next(iter(memory)), None)
-            memory[key] = made
-            return made
-        found: Kept = memory.get(key) or make()
-        return found
-
-    def rows(self, key: Hashable, make: Callable[[], FloatArray]) -> FloatArray:
-        """Return the simulated rows of a key if they were among the last ones; else make them."""
-        memory: dict[Hashable, FloatArray] = self.__dict__.setdefault('_rows', {})
-        with _KEEPING:
-            found = memory.pop(key, None)
-        if found is None:
-            found = make()
-            found.flags.writeable = False
-        with _KEEPING:
-            room = setting('motions_kept') * 1e6 - found.nbytes
-            while memory and sum(one.nbytes for one in memory.values()) > room:
-                del memory[next(iter(memory))]
-            memory[key] = found
-        return found
-
     def slice_of(self, channel: Channel) -> slice:
         """Return where a channel's readings stand; empty where there are none."""
-        first = int(np.searchsorted(self.channels, int(channel), side='left'))
-        last = int(np.searchsorted(self.channels, int(channel), side='right'))
-        return slice(first, last)
+        return self._slices[int(channel)]
+
+    @cached_property
+    def _slices(self) -> list[slice]:
+        codes = np.arange(len(Channel) + 1)
+        return [slice(*pair) for pair in pairwise(
+            np.searchsorted(self.channels, codes, side='left').tolist())]
 
 
 def smoothed(times: FloatArray, values: FloatArray, width: float) -> FloatArray:

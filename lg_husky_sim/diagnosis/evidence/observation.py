@@ -20,7 +20,7 @@ from lg_husky_sim.diagnosis.evidence.low_pass import low_passed
 from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant, SensorModel
-from lg_husky_sim.signals import BodyTwist, FloatArray, TimeSeries
+from lg_husky_sim.signals import FloatArray, TimeSeries
 from lg_husky_sim.simulation.events import COLUMNS, Events, Propagator
 from lg_husky_sim.simulation.starting import commanded_until
 import numpy as np
@@ -52,6 +52,10 @@ class Wanted:
     ----------
     events : Events
         Of the drive's commands and all times.
+    commands : TimeSeries
+        Those, as they act.
+    earlier : (TimeSeries, Events) or None
+        Commands before the start, as they act, of a drive that begins in motion.
     parts : mapping of str to slice
         Rows of ``wheels`` (ends of the windows), ``begins`` (their begins), ``imu``, ``pose`` and
         ``probe``.
@@ -60,6 +64,8 @@ class Wanted:
     """
 
     events: Events
+    commands: TimeSeries
+    earlier: tuple[TimeSeries, Events] | None
     parts: Mapping[str, slice]
     spans: FloatArray
 
@@ -144,9 +150,17 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
     delay = command_lag(drive, reading)
     if delay != 0.0:
         commands = TimeSeries(commands.times + delay, commands.values, commands.names)
-    events = Events(commands, times, start=drive.start)
     spans = times[parts['wheels']] - times[parts['begins']] if begins.size else begins
-    return Wanted(events, parts, spans)
+    return Wanted(Events(commands, times, start=drive.start), commands, _before(drive, delay),
+                  parts, spans)
+
+
+def _before(drive: Drive, delay: float) -> tuple[TimeSeries, Events] | None:
+    # What was commanded before the start, and when it is left.
+    if drive.earlier is None:
+        return None
+    earlier = TimeSeries(drive.earlier.times + delay, drive.earlier.values, drive.earlier.names)
+    return earlier, Events(earlier, [drive.start], start=float(drive.earlier.times[0]))
 
 
 def _nodes(drive: Drive, stamps: FloatArray, commands: FloatArray) -> FloatArray:
@@ -188,9 +202,9 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
     imu_window = reading.values.get('imu_window') if reading.imu != math.inf else 0.0
     key = (reading.wheels, reading.imu, window, imu_window, command_lag(drive, reading), delays,
            probe)
-    wanted = drive.remembered(key, lambda: _wanted(drive, reading, delays, probe))
-    rows = drive.rows((key, _signature(plant)), lambda: _driven(
-        plant, drive, wanted.events, command_lag(drive, reading)))
+    wanted = drive.memory.remembered('wanted', key, lambda: _wanted(
+        drive, reading, delays, probe))
+    rows = drive.memory.rows((key, _signature(plant)), lambda: _driven(plant, drive, wanted))
     events = wanted.events
     times = events.times
     if events.order is not None:
@@ -199,31 +213,26 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
     return Motion(times, rows, wanted, plant)
 
 
-def _driven(plant: Plant, drive: Drive, events: Events, lag: float) -> FloatArray:
+def _driven(plant: Plant, drive: Drive, wanted: Wanted) -> FloatArray:
     # Rows of the kernel.
     kept = plant.__dict__
     # One for all drives: the modes of a plant are found once.
     if '_propagator' not in kept:
         kept['_propagator'] = Propagator(plant)
     propagator: Propagator = kept['_propagator']
-    commands = TimeSeries(events.stamps, events.values, drive.commands.names)
-    before = commanded_until(drive.start, commands, drive.twist, drive.wheel_rates)
+    before = commanded_until(drive.start, wanted.commands, drive.twist, drive.wheel_rates)
     twist = drive.twist
     if drive.wheel_rates is not None and not drive.still:
-        left, right = drive.wheel_rates
-        ahead = sum(propagator.rates_without_slip(BodyTwist(1.0, 0.0))) / 2.0
-        turning = propagator.rates_without_slip(BodyTwist(0.0, 1.0))
-        twist = BodyTwist(0.5 * (left + right) / ahead, (right - left) / (turning[1] - turning[0]))
+        twist = propagator.twist_without_slip(*drive.wheel_rates)
     state = propagator.initial(drive.pose, twist, drive.start, drive.wheel_rates,
                                drive.wheel_angles, before)
-    if drive.earlier is not None:
+    if wanted.earlier is not None:
         # What the base still does of these, at the start, not long ago.
-        earlier = TimeSeries(drive.earlier.times + lag, drive.earlier.values, drive.earlier.names)
-        begin = float(drive.earlier.times[0])
-        state = propagator.run_in(earlier, propagator.initial(
-            drive.pose, twist, begin, drive.wheel_rates, drive.wheel_angles,
-            commanded_until(begin, earlier, drive.twist, drive.wheel_rates)), state)
-    return propagator.run(events, state, fine_pose=False)
+        earlier, events = wanted.earlier
+        state = propagator.run_in(events, propagator.initial(
+            drive.pose, twist, events.start, drive.wheel_rates, drive.wheel_angles,
+            commanded_until(events.start, earlier, drive.twist, drive.wheel_rates)), state)
+    return propagator.run(wanted.events, state, fine_pose=False)
 
 
 def _signature(plant: Plant) -> bytes:
@@ -339,15 +348,25 @@ def _observed(motion: Motion, drive: Drive, reading: Reading, sensors: SensorMod
 def _places(drive: Drive, distance: FloatArray, reading: Reading
             ) -> tuple[FloatArray, FloatArray]:
     # The way between two stamps is the chord of an arc from one measured heading to the next.
-    heading = drive.heading - reading.get('pose_turn')
-    half = 0.5 * np.diff(heading)
-    chord = np.diff(distance) * np.sinc(half / np.pi)
-    middle = heading[:-1] + half
-    lever = reading.get('pose_lever')
-    x = drive.pose.x + distance[0] * np.cos(heading[0]) + np.concatenate(
-        [[0.0], np.cumsum(chord * np.cos(middle))])
-    y = drive.pose.y + distance[0] * np.sin(heading[0]) + np.concatenate(
-        [[0.0], np.cumsum(chord * np.sin(middle))])
-    x += lever * (np.cos(drive.heading) - np.cos(drive.heading[0]))
-    y += lever * (np.sin(drive.heading) - np.sin(drive.heading[0]))
+    turn, lever = reading.get('pose_turn'), reading.get('pose_lever')
+    first, shorter, ways, levers = drive.memory.remembered(
+        'ways', turn, lambda: _ways(drive, turn))
+    chord = np.diff(distance) * shorter
+    x, y = (start + distance[0] * ahead + np.concatenate([[0.0], np.cumsum(chord * way)])
+            for start, ahead, way in zip((drive.pose.x, drive.pose.y), first, ways, strict=True))
+    x += lever * levers[0]
+    y += lever * levers[1]
     return x, y
+
+
+def _ways(drive: Drive, turn: float) -> tuple[
+        tuple[float, float], FloatArray, FloatArray, FloatArray]:
+    # Cosine and sine of the first direction; chord over arc, cosine and sine of its direction,
+    # from each stamp to the next; how far the direction of a lever has moved.
+    heading = drive.heading - turn
+    half = 0.5 * np.diff(heading)
+    middle = heading[:-1] + half
+    own = drive.heading
+    return ((float(np.cos(heading[0])), float(np.sin(heading[0]))), np.sinc(half / np.pi),
+            np.stack([np.cos(middle), np.sin(middle)]),
+            np.stack([np.cos(own) - np.cos(own[0]), np.sin(own) - np.sin(own[0])]))

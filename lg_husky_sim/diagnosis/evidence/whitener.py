@@ -48,14 +48,14 @@ PROCESS = ('force', 'moment', 'drive', 'force_time', 'moment_time', 'drive_time'
 
 
 @jit_part
-def _advance(z: FloatArray, dt: float, cosine: float, sine: float, fade_f: float, fade_m: float,
-             fade_d: float, m: FloatArray) -> None:
+def _advance(z: FloatArray, width: int, dt: float, cosine: float, sine: float, fade_f: float,
+             fade_m: float, fade_d: float, m: FloatArray) -> None:
     # All columns of z over a short dt: the disturbances decay, the rest by Euler's rule. Numbers
     # of the model are taken out first: they cannot change with z then, and columns go in vectors.
     vv, vw, wv, ww = m[0], m[1], m[2], m[3]
     vf, vm, vl, vr, wf, wm, wl, wr = m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]
     lv, lw, ll, lr, rv, rw, rl, rr = m[12], m[13], m[14], m[15], m[16], m[17], m[18], m[19]
-    for j in range(z.shape[1]):
+    for j in range(width):
         force, moment, left, right = z[0, j], z[1, j], z[2, j], z[3, j]
         v, w = z[4, j], z[5, j]
         z[7, j] += dt * w
@@ -72,7 +72,7 @@ def _advance(z: FloatArray, dt: float, cosine: float, sine: float, fade_f: float
 
 
 @jit_part
-def _propagate(z: FloatArray, left: float, longest: float, cosine: float, sine: float,
+def _propagate(z: FloatArray, width: int, left: float, longest: float, cosine: float, sine: float,
                process: FloatArray, m: FloatArray) -> None:
     # All columns of z over a time, by steps that are short enough.
     while left > 1e-9:
@@ -81,19 +81,19 @@ def _propagate(z: FloatArray, left: float, longest: float, cosine: float, sine: 
         fade_f = np.exp(-dt / process[3])
         fade_m = np.exp(-dt / process[4])
         fade_d = np.exp(-dt / process[5])
-        _advance(z, dt, cosine, sine, fade_f, fade_m, fade_d, m)
+        _advance(z, width, dt, cosine, sine, fade_f, fade_m, fade_d, m)
 
 
 @jit_part
-def _read_all(z: FloatArray, channel: int, m: FloatArray, seen: FloatArray) -> None:
+def _read_all(z: FloatArray, width: int, channel: int, m: FloatArray, seen: FloatArray) -> None:
     # H z of one channel for all columns.
     if channel < 2:
         v, w = m[12 + 4 * channel], m[13 + 4 * channel]
         left, right = m[14 + 4 * channel], m[15 + 4 * channel]
-        for j in range(z.shape[1]):
+        for j in range(width):
             seen[j] = v * z[4, j] + w * z[5, j] + left * z[2, j] + right * z[3, j]
     elif channel == 2:
-        for j in range(z.shape[1]):
+        for j in range(width):
             seen[j] = z[5, j] + z[6, j]
     else:
         state = 7
@@ -105,29 +105,31 @@ def _read_all(z: FloatArray, channel: int, m: FloatArray, seen: FloatArray) -> N
             state = 10
         elif channel == 7:
             state = 11
-        for j in range(z.shape[1]):
+        for j in range(width):
             seen[j] = z[state, j]
 
 
 @jit_part
-def _correct(z: FloatArray, gain: FloatArray, k: int, seen: FloatArray) -> None:
+def _correct(z: FloatArray, width: int, gain: FloatArray, k: int, seen: FloatArray) -> None:
     # Add gains times innovations.
     for i in range(12):
         by = gain[k, i]
-        for j in range(z.shape[1]):
+        for j in range(width):
             z[i, j] += by * seen[j]
 
 
 @jit_part
 def _width(count: int) -> int:
-    # Columns with those that fill them up.
+    # Columns with those that fill them up, where that is faster.
+    if count <= 16:
+        return 1 if count == 1 else (4 if count <= 4 else 16)
     rest = count % TOGETHER
     return count + TOGETHER - rest if 2 * rest >= TOGETHER else count
 
 
 @jit_part
 def _transpose(p: FloatArray) -> None:
-    for i in range(p.shape[0]):
+    for i in range(12):
         for j in range(i):
             p[i, j], p[j, i] = p[j, i], p[i, j]
 
@@ -186,7 +188,8 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
     p = np.zeros((12, 12))
     for i in range(12):
         p[i, i] = initial[i]
-    column = np.zeros((12, 1))
+    seen = np.zeros(12)
+    column = seen.reshape(12, 1)
     late, moved, of_late = np.zeros(4), (4, 5, 10, 11), (-1, 2, 6, 7)
     force_time, moment_time, drive_time = process[3], process[4], process[5]
     now = times[order[0]]
@@ -213,9 +216,9 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
             fade_f = np.exp(-dt / force_time)
             fade_m = np.exp(-dt / moment_time)
             fade_d = np.exp(-dt / drive_time)
-            _advance(p, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+            _advance(p, 12, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
             _transpose(p)
-            _advance(p, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
+            _advance(p, 12, dt, cosine[reading], sine[reading], fade_f, fade_m, fade_d, model)
             p[0, 0] += process[0] ** 2 * (1.0 - fade_f * fade_f)
             p[1, 1] += process[1] ** 2 * (1.0 - fade_m * fade_m)
             p[2, 2] += process[2] ** 2 * (1.0 - fade_d * fade_d)
@@ -226,9 +229,8 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
             p[9, 9] += process[7] ** 2 * dt
         now = times[reading]
         channel = int(channels[reading])
-        for i in range(12):
-            # p is symmetric: H p by columns is p H'.
-            column[i, 0] = _read(p, i, channel, model)
+        # p is symmetric: H p by columns is p H'.
+        _read_all(p, 12, channel, model, seen)
         unsure = noise[reading]
         near = kick
         while near < kicks.shape[0] and kicks[near, 0] - kicks[near, 5] <= now:
@@ -246,11 +248,31 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
             near += 1
         variance = _read(column, 0, channel, model) + unsure
         for i in range(12):
-            gain[k, i] = column[i, 0] / variance
-        for i in range(12):
+            by = seen[i] / variance
+            gain[k, i] = by
             for j in range(12):
-                p[i, j] -= gain[k, i] * column[j, 0]
+                p[i, j] -= by * seen[j]
         scale[k] = np.sqrt(variance)
+
+
+@jit_part
+def _whiten(width: int, residuals: FloatArray, times: FloatArray, channels: Integers,
+            order: Integers, cosine: FloatArray, sine: FloatArray, model: FloatArray,
+            process: FloatArray, longest: float, gain: FloatArray, scale: FloatArray,
+            out: FloatArray, z: FloatArray, seen: FloatArray) -> None:
+    # Columns filled up to a width; for one that the compiler knows it makes faster code.
+    now = times[order[0]]
+    for k in range(order.size):
+        reading = order[k]
+        _propagate(z, width, times[reading] - now, longest, cosine[reading], sine[reading],
+                   process, model)
+        now = times[reading]
+        _read_all(z, width, int(channels[reading]), model, seen)
+        deviation = scale[k]
+        for j in range(residuals.shape[1]):
+            seen[j] = residuals[reading, j] - seen[j]
+            out[k, j] = seen[j] / deviation
+        _correct(z, width, gain, k, seen)
 
 
 @jit
@@ -271,19 +293,18 @@ def whiten(residuals: FloatArray, times: FloatArray, channels: Integers, order: 
     """
     count = residuals.shape[1]
     width = _width(count)
-    z, seen = np.zeros((12, width)), np.zeros(width)
-    now = times[order[0]]
-    for k in range(order.size):
-        reading = order[k]
-        _propagate(z, times[reading] - now, longest, cosine[reading], sine[reading], process,
-                   model)
-        now = times[reading]
-        _read_all(z, int(channels[reading]), model, seen)
-        deviation = scale[k]
-        for j in range(count):
-            seen[j] = residuals[reading, j] - seen[j]
-            out[k, j] = seen[j] / deviation
-        _correct(z, gain, k, seen)
+    if width == 1:
+        _whiten(1, residuals, times, channels, order, cosine, sine, model, process, longest,
+                gain, scale, out, np.zeros((12, 1)), np.zeros(1))
+    elif width == 4:
+        _whiten(4, residuals, times, channels, order, cosine, sine, model, process, longest,
+                gain, scale, out, np.zeros((12, 4)), np.zeros(4))
+    elif width == 16:
+        _whiten(16, residuals, times, channels, order, cosine, sine, model, process, longest,
+                gain, scale, out, np.zeros((12, 16)), np.zeros(16))
+    else:
+        _whiten(width, residuals, times, channels, order, cosine, sine, model, process, longest,
+                gain, scale, out, np.zeros((12, width)), np.zeros(width))
 
 
 @jit
@@ -322,7 +343,7 @@ def respond(efforts: FloatArray, grid: FloatArray, times: FloatArray, channels: 
             for i in range(4):
                 for j in range(count):
                     z[i, j] = efforts[at, i, j]
-            _advance(z, dt, cosine[reading], sine[reading], 1.0, 1.0, 1.0, model)
+            _advance(z, count, dt, cosine[reading], sine[reading], 1.0, 1.0, 1.0, model)
         now = times[reading]
         at = max(0, min(last, int((now - grid[0]) / spacing)))
         channel = int(channels[reading])
@@ -362,17 +383,17 @@ def whiten_switched(change: FloatArray, states: FloatArray, on: NDArray[np.uint8
     now = times[order[0]]
     for k in range(order.size):
         reading = order[k]
-        _propagate(z, times[reading] - now, longest, cosine[reading], sine[reading], process,
-                   model)
+        _propagate(z, width, times[reading] - now, longest, cosine[reading], sine[reading],
+                   process, model)
         now = times[reading]
         for j in range(count):
             if k > 0 and on[k, j] != on[k - 1, j]:
                 sign = 1.0 if on[k, j] else -1.0
                 for i in range(4, 12):
                     z[i, j] += sign * states[k, i]
-        _read_all(z, int(channels[reading]), model, seen)
+        _read_all(z, width, int(channels[reading]), model, seen)
         moved, deviation = change[reading], scale[k]
         for j in range(count):
             seen[j] = (moved if on[k, j] else 0.0) - seen[j]
             out[k, j] = seen[j] / deviation
-        _correct(z, gain, k, seen)
+        _correct(z, width, gain, k, seen)

@@ -1,0 +1,58 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What was worked out about a drive, for as long as there is room for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from threading import Lock
+from typing import Any, TypeVar
+
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray
+
+Kept = TypeVar('Kept')
+
+
+class Memory:
+    """What was made last, of each kind, and the simulated rows that were asked for last."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, dict[Hashable, Any]] = {}
+        self._rows: dict[Hashable, FloatArray] = {}
+        self._size = 0
+        self._keeping = Lock()
+
+    def remembered(self, kind: str, key: Hashable, make: Callable[[], Kept]) -> Kept:
+        """Return what was made under a key, among the last of its kind; else make it."""
+        memory = self._made.setdefault(kind, {})
+        if key not in memory:
+            made = make()
+            while len(memory) >= setting('readings_kept'):
+                memory.pop(next(iter(memory)), None)
+            memory[key] = made
+            return made
+        found: Kept = memory.get(key) or make()
+        return found
+
+    def rows(self, key: Hashable, make: Callable[[], FloatArray]) -> FloatArray:
+        """Return the simulated rows of a key if they were among the last ones; else make them."""
+        found = self._taken(key)
+        if found is None:
+            found = make()
+            found.flags.writeable = False
+        self._taken(key)
+        with self._keeping:
+            room = setting('motions_kept') * 1e6 - found.nbytes
+            while self._rows and self._size > room:
+                self._size -= self._rows.pop(next(iter(self._rows))).nbytes
+            self._rows[key] = found
+            self._size += found.nbytes
+        return found
+
+    def _taken(self, key: Hashable) -> FloatArray | None:
+        with self._keeping:
+            found = self._rows.pop(key, None)
+            if found is not None:
+                self._size -= found.nbytes
+            return found
