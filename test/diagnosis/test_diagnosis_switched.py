@@ -15,6 +15,7 @@ from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
 from lg_husky_sim.diagnosis.selection import onsets
+from lg_husky_sim.diagnosis.selection.screening import problems_of, Projection
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -50,3 +51,39 @@ def test_whitening_a_switched_change_is_whitening_a_gated_simulation(
     assert not np.any(found[times < onset.value])
     assert np.linalg.norm(found - truth) < 0.1 * np.linalg.norm(truth)
     assert float(found @ truth) > 0.99 * np.linalg.norm(found) * np.linalg.norm(truth)
+
+
+def test_each_onset_has_the_products_that_it_would_have_alone(
+        drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nearly all onsets of one recording are alike in another one, and are whitened once there."""
+    names = ['first', 'second']
+    drives = drives_of([drive(name, 'nothing', k) for k, name in enumerate(names)])
+    model = load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    hypothesis = next(h for h in hypotheses(model.structure) if h.effect.id == 'yaw_pull')
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, names, start, first_guess(drives), pool)
+        base = evidence.fit(start, rounds=1)
+        projection, every = Projection(base), onsets.onsets_of(evidence)
+        motions = evidence.motions(base.point, True)
+        changes = onsets._changes(evidence, base, motions, hypothesis, hypothesis.trials()[0])
+        assert changes is not None
+
+        def patterns(some: list[Onset]) -> list[onsets._Patterns]:
+            return [onsets._patterns(evidence, d, m, w.frame.times[w.frame.order], some)
+                    for d, m, w in zip(drives, motions, evidence.whiteners, strict=True)]
+        shared = patterns(every)
+        assert all(one.different.shape[1] < len(every) for one in shared)
+        normals, slopes = problems_of(onsets._products(projection, evidence, changes, shared))
+        for k, onset in enumerate(every):
+            columns = np.vstack([
+                np.column_stack([w.switched(*of_number[d], alone.different)
+                                 for of_number in changes])
+                for d, (w, alone) in enumerate(zip(
+                    evidence.whiteners, patterns([onset]), strict=True))])
+            normal, slope = projection.problem(columns)
+            np.testing.assert_allclose(normals[k], normal, rtol=1e-9, atol=1e-12)
+            np.testing.assert_allclose(slopes[k], slope, rtol=1e-9, atol=1e-9)
+        monkeypatch.setattr(onsets, 'onsets_of', lambda _: [])
+        assert onsets.onset_looks(evidence, base, [hypothesis], []) == []

@@ -151,6 +151,17 @@ def test_whitening_is_linear_and_does_not_look_ahead(setup: tuple[Evidence, Poin
     np.testing.assert_array_equal(whitener.apply(cut)[:1000], whitener.apply(a)[:1000])
 
 
+@pytest.mark.parametrize('count', [1, 2, 4, 5, 16, 17, 31, 33])
+def test_columns_that_are_whitened_together_have_the_bits_of_each_alone(
+        setup: tuple[Evidence, Point], count: int) -> None:
+    """Some are filled up to a width that the compiler knows."""
+    evidence, _ = setup
+    columns = np.random.default_rng(count).standard_normal((evidence.count, count))
+    together = evidence.whiteners[0].apply(columns)
+    for k in range(count):
+        assert np.array_equal(together[:, k], evidence.whiteners[0].apply(columns[:, k]))
+
+
 def test_a_decay_faster_than_a_step_of_the_filter_is_slowed_and_no_gain_with_it() -> None:
     model = load_model()
     usual, stiff = (slow_model(

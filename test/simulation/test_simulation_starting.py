@@ -7,9 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import BodyTwist, TimeSeries
 from lg_husky_sim.simulation import Simulator
+from lg_husky_sim.simulation.initial_state import InitialStates
 from lg_husky_sim.simulation.starting import at_rest, commanded_until
 import numpy as np
 import pytest
@@ -68,3 +71,16 @@ def test_a_start_is_limited_as_the_base_is_then(
         twist=BodyTwist(0.4, 0.0), time=time, command=BodyTwist(0.9, 0.0)), BodyTwist(0.9, 0.0))
     reached = 0.5 * sum(state.voltages) / plant.sets[0].command.volts_per_speed
     assert reached == pytest.approx(0.4 if limited else 0.9, abs=1e-9)
+
+
+@pytest.mark.parametrize('twist', [BodyTwist(0.7, 0.0), BodyTwist(-0.2, 0.4), ROLLING])
+def test_rates_and_velocity_without_slip_belong_together(twist: BodyTwist) -> None:
+    model = load_model()
+    starts = InitialStates(compile_model(model.structure).at(model.parameters))
+    left, right = starts.rates_without_slip(twist)
+    found = starts.twist_without_slip(left, right)
+    assert found.forward == pytest.approx(twist.forward, abs=1e-12)
+    assert found.yaw == pytest.approx(twist.yaw, abs=1e-12)
+    state = starts.flat(twist=twist)
+    seen = compile_model(model.structure).at(model.parameters).sets[0].rows[:4] @ state[:6]
+    np.testing.assert_allclose(seen, [left, right, twist.forward, twist.yaw], atol=1e-9)

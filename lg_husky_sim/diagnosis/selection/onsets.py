@@ -77,8 +77,10 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     """
     if base.point.structure.onset is not None:
         return []
-    known = {one.hypothesis.label: one.numbers for one in seen}
     onsets = onsets_of(evidence)
+    if not onsets:
+        return []
+    known = {one.hypothesis.label: one.numbers for one in seen}
     projection = Projection(base)
     motions = evidence.motions(base.point, True)
     patterns = [_patterns(evidence, d, motion, w.frame.times[w.frame.order], onsets)
@@ -131,18 +133,20 @@ def _patterns(evidence: Evidence, drive: Drive, motion: Motion, times: FloatArra
     place = (np.interp(times, drive.pose_times, drive.measured[drive.slice_of(Channel.X)])
              if drive.pose_times.size else
              np.interp(times, probe_times(drive), motion.column('x', 'probe')))
-    found: NDArray[np.uint8] = np.zeros((times.size, len(onsets)), dtype=np.uint8)
+    found: NDArray[np.uint8] = np.zeros((len(onsets), times.size), dtype=np.uint8)
     for k, onset in enumerate(onsets):
         match onset.kind:
             case OnsetKind.TIME:
                 own = names.index(onset.recording)
-                found[:, k] = at > own if at != own else times >= onset.value
+                found[k] = at > own if at != own else times >= onset.value
             case OnsetKind.PLACE_ABOVE:
-                found[:, k] = place >= onset.value
+                found[k] = place >= onset.value
             case OnsetKind.PLACE_BELOW:
-                found[:, k] = place <= onset.value
-    different, place_of = np.unique(found, axis=1, return_inverse=True)
-    return _Patterns(different, place_of.reshape(-1))
+                found[k] = place <= onset.value
+    known: dict[bytes, int] = {}
+    number = np.array([known.setdefault(row.tobytes(), len(known)) for row in found])
+    _, first = np.unique(number, return_index=True)
+    return _Patterns(np.ascontiguousarray(found[first].T), number)
 
 
 def _changes(evidence: Evidence, base: Fit, motions: Sequence[Motion], hypothesis: Hypothesis,
