@@ -299,9 +299,6 @@ def whiten(residuals: FloatArray, times: FloatArray, channels: Integers, order: 
     elif width == 4:
         _whiten(4, residuals, times, channels, order, cosine, sine, model, process, longest,
                 gain, scale, out, np.zeros((12, 4)), np.zeros(4))
-    elif width == 16:
-        _whiten(16, residuals, times, channels, order, cosine, sine, model, process, longest,
-                gain, scale, out, np.zeros((12, 16)), np.zeros(16))
     else:
         _whiten(width, residuals, times, channels, order, cosine, sine, model, process, longest,
                 gain, scale, out, np.zeros((12, width)), np.zeros(width))
