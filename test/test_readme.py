@@ -14,6 +14,7 @@ from types import ModuleType
 import click
 from lg_husky_sim.cli.main import cli
 from lg_husky_sim.cli.ros_arguments import RosVerb, split_ros_args
+from lg_husky_sim.diagnosis.settings import setting
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -49,6 +50,12 @@ def test_tables_that_differ_are_seen() -> None:
 
 def test_the_readme_stays_short() -> None:
     assert len((ROOT / 'README.md').read_text(encoding='utf-8').splitlines()) < 120
+
+
+@pytest.mark.parametrize('page', ['README.md', 'docs/diagnosis.md'])
+def test_the_nominal_rate_of_false_alarms_is_that_of_the_settings(page: str) -> None:
+    rate = 100.0 * setting('false_alarm_rate')
+    assert f'nominal false-alarm rate of {rate:g} %' in (ROOT / page).read_text(encoding='utf-8')
 
 
 def test_each_page_stands_in_the_site() -> None:

@@ -47,7 +47,7 @@ def command(
 
     The model is recalibrated first, within the tolerances of its parameters. The remaining
     residual is compared with every effect of the catalogue; one is adopted only if it explains
-    more than chance does at a stated false-alarm rate. A folder stands for all bags in it.
+    more than chance does at the nominal false-alarm rate. A folder stands for all bags in it.
     """
     from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.folders import check_folder

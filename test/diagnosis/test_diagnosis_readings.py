@@ -25,6 +25,7 @@ from lg_husky_sim.recording.wheels import rates_from_angles
 from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.threads import Threads
 import numpy as np
+from numpy.typing import NDArray
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -33,6 +34,27 @@ from scipy.integrate import solve_ivp
 def driven(drive: Callable[..., Recording]) -> Drive:
     """Return one drive of a robot that lacks nothing."""
     return drives_of([drive('ahead', 'nothing', 1)])[0]
+
+
+def places_read(drive: Drive, **values: float) -> NDArray[np.complex128]:
+    """Return what a pose would have read of a model, as complex numbers x + iy [m]."""
+    model = load_model()
+    reading = Reading(values=values)
+    seen = observe(simulate(compile_model(model.structure).at(model.parameters), drive, reading),
+                   drive, reading)
+    return np.asarray(seen[drive.slice_of(Channel.X)] + 1j * seen[drive.slice_of(Channel.Y)])
+
+
+def test_a_turned_frame_turns_the_way_and_a_lever_swings_with_the_heading(driven: Drive) -> None:
+    plain = places_read(driven)
+    start = driven.pose.x + 1j * driven.pose.y
+    assert np.ptp(np.abs(plain)) > 1.0
+    np.testing.assert_allclose(places_read(driven, pose_turn=0.3) - start,
+                               (plain - start) * np.exp(-0.3j), atol=1e-12)
+    swung = np.exp(1j * driven.heading) - np.exp(1j * driven.heading[0])
+    assert np.max(np.abs(swung)) > 0.5
+    np.testing.assert_allclose(places_read(driven, pose_lever=0.2) - plain, 0.2 * swung,
+                               atol=1e-12)
 
 
 @pytest.mark.parametrize('lag', [0.008, 0.025, 0.075])

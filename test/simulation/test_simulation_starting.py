@@ -84,3 +84,11 @@ def test_rates_and_velocity_without_slip_belong_together(twist: BodyTwist) -> No
     state = starts.flat(twist=twist)
     seen = compile_model(model.structure).at(model.parameters).sets[0].rows[:4] @ state[:6]
     np.testing.assert_allclose(seen, [left, right, twist.forward, twist.yaw], atol=1e-9)
+
+
+def test_a_base_whose_wheels_slip_begins_with_all_that_was_measured() -> None:
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    state = InitialStates(plant).flat(twist=BodyTwist(0.6, -0.3), wheel_rates=(4.5, 2.0))
+    seen = plant.sets[0].rows[:4] @ state[:len(plant.states)]
+    np.testing.assert_allclose(seen, [4.5, 2.0, 0.6, -0.3], atol=1e-9)
