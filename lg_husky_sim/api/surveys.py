@@ -223,7 +223,7 @@ def _missing(recording: Recording, parts: Sequence[rec.Segment], moving: float,
 def _related(related: Sequence[Relation]) -> Table:
     """Return what each stream says of the others, without a model of the robot."""
     return Table('Sensors compared with each other (factor: reference over source)', (
-        'quantity', 'source', 'reference', 'factor', 'source is late by [s]', 'explained'), tuple(
+        'quantity', 'source', 'reference', 'factor', 'lag of the source [s]', 'explained'), tuple(
         (one.quantity, one.source, one.reference, _number(one.factor, 4), _number(one.late, 2),
          f'{100.0 * max(one.explained, 0.0):.0f} %') for one in related))
 

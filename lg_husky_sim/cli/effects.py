@@ -12,6 +12,9 @@ from lg_husky_sim.cli.common import EFFECT, Output, spoken
 @click.argument('effect', required=False, metavar='[ID]', type=EFFECT)
 @spoken()
 def command(effect: str | None, say: Output) -> None:
-    """List the effects that a model can have and diagnose can find, or the parameters of one."""
+    """List the effects that a model can have, or the parameters of one.
+
+    What diagnose looks for are these, but for static_friction and tyre_windup.
+    """
     from lg_husky_sim.api.lists import list_effects
     say.result(list_effects(effect))

@@ -34,7 +34,7 @@ from lg_husky_sim.cli.several import SeveralWords
                    'marks as free, and the parameters of its effects.')
 @click.option('--effects', multiple=True, metavar='IDS', type=EFFECTS,
               help='Effects of the catalogue to add, separated by commas: id, id:side or '
-                   'id:shape, such as speed_loop,command_latency,command_limit:yaw.')
+                   'id:shape; command_latency,command_limit:yaw, for instance.')
 @click.option('--method', type=click.Choice(['least-squares', 'ga', 'de']),
               default='least-squares', show_default=True,
               help="Least squares on all outputs; or the paper's genetic algorithm, or "

@@ -366,8 +366,9 @@ def effect_kind(name: str) -> EffectKind:
     """
     known = {**catalogue(), **descriptions()}
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1) or [
-            one for one, kind in known.items() if name and (name in one or name in kind.name)]
+        offered = catalogue()
+        near = difflib.get_close_matches(name, offered, n=1) or [
+            one for one, kind in offered.items() if name and (name in one or name in kind.name)]
         hint = f'; did you mean {" or ".join(near)}?' if near else ''
-        raise ParameterError(f'unknown effect {shown(name)}{hint} (known: {", ".join(known)})')
+        raise ParameterError(f'unknown effect {shown(name)}{hint} (known: {", ".join(offered)})')
     return known[name]

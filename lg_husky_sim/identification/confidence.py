@@ -193,6 +193,8 @@ def undetermined(result: Confidence, values: FloatArray) -> tuple[str, ...]:
         joint = float(np.sqrt(max(variance, 0.0)))
         if joint * setting('combination_gain') > min(relative[i], relative[j]):
             continue
+        if reach * max(relative[i], relative[j]) < setting('well_determined'):
+            continue
         # The less certain one over the other reads as B_H/B.
         first, second = names[j], names[i]
         form = f'{first}/{second}' if sign > 0.0 else f'{first}·{second}'

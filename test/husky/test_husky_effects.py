@@ -87,6 +87,9 @@ def test_unknown_ids_sides_and_shapes_are_refused() -> None:
             Effect(part)
     with pytest.raises(ParameterError, match=r'unknown effect .*did you mean payload'):
         Effect('paylod')
+    with pytest.raises(ParameterError) as refusal:
+        Effect('smooth')
+    assert 'smooth_' not in str(refusal.value)
     with pytest.raises(ParameterError, match=r'side .*both.* of effect encoder_scale'):
         Effect('encoder_scale', 'both')
     with pytest.raises(ParameterError, match=r'shape .*round.* of effect driver_deadband'):

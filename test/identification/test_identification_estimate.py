@@ -12,7 +12,9 @@ from lg_husky_sim.errors import FitError, ParameterError, RecordingError
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.identification.confidence import Confidence, undetermined
 from lg_husky_sim.identification.estimate import estimate
+from lg_husky_sim.identification.least_squares import Unknown
 from lg_husky_sim.identification.options import effect_in, names_in, with_effects
 from lg_husky_sim.identification.result import FitResult, Method
 from lg_husky_sim.recording import Segment
@@ -67,6 +69,21 @@ def test_only_the_ratio_of_the_dampings_is_said_to_be_known(fit: FitResult) -> N
     names = [one.name for one in fit.estimates]
     i, j = names.index('wheel_damping'), names.index('yaw_damping')
     assert fit.correlation[i, j] > 0.95
+
+
+def known_to(deviation: float) -> Confidence:
+    names = ('wheel_damping', 'yaw_damping')
+    unknowns = tuple(Unknown(n, True, 0.0, np.inf, 1e-3, 1e3, 1e-6) for n in names)
+    correlation = np.array([[1.0, 0.999], [0.999, 1.0]])
+    return Confidence(unknowns, deviation ** 2 * correlation, correlation, 1e3, 30, np.ones(2),
+                      np.ones(2), np.ones(2), (), np.empty(0))
+
+
+def test_what_is_known_well_alone_is_not_said_to_be_known_only_together() -> None:
+    values = np.array([30.0, 200.0])
+    (sentence,) = undetermined(known_to(0.1), values)
+    assert sentence.startswith('only yaw_damping/wheel_damping = 6.667 is well determined')
+    assert undetermined(known_to(0.001), values) == ()
 
 
 def test_profile_agrees_with_the_interval_where_the_cost_is_a_parabola(fit: FitResult) -> None:
