@@ -27,7 +27,7 @@ class Selection:
         One a change, each with the others adopted, the largest gain first; a single one without
         a name where nothing changed, or nothing that has one.
     body, loop : Block or None
-        What both blocks say where nothing is adopted.
+        What both blocks say where nothing is adopted, fitted with what gains most.
     claimed : Block
         What all channels say where the changes that are named are.
     """
@@ -42,6 +42,10 @@ def select(compared: Compared, settings: Settings) -> Selection:
     """
     Adopt one change after another, then drop those that the others make up for.
 
+    Of what the recordings are not fitted with, a derivative where the robot has none of it gives
+    a poor idea. Where such a change gains most, the later recordings are fitted with it before
+    anything is decided.
+
     Every further change is weighed where those before it differ as well, by the same evidence and
     against the same partitions. So the rate of false alarms is that of the first that is too many.
 
@@ -55,6 +59,9 @@ def select(compared: Compared, settings: Settings) -> Selection:
     Selection
     """
     body, loop = compared((), ())
+    body, loop = compared((), _bringing([
+        block.candidates[0].change for block in (body, loop)
+        if block is not None and block.candidates and block.candidates[0].gain > 0.0], settings))
     adopted: list[Change] = []
     decisions: tuple[Decision, ...] = (decide(body, loop, settings),)
     latest = decisions[0].named

@@ -28,8 +28,8 @@ def weighed(change: Change, gain: float, chance: float) -> Candidate:
                      chance)
 
 
-def said(gain: Callable[[frozenset[str]], float], chance: float = 1e-6
-         ) -> tuple[list[str], list[tuple[str, ...]]]:
+def said(gain: Callable[[frozenset[str]], float], chance: float = 1e-6,
+         chance_fitted: float | None = None) -> tuple[list[str], list[tuple[str, ...]]]:
     """Return what is named where sets of changes gain so much together, and what was fitted."""
     fits: list[tuple[str, ...]] = []
 
@@ -38,7 +38,8 @@ def said(gain: Callable[[frozenset[str]], float], chance: float = 1e-6
         there = frozenset(one.effect for one in adopted)
         known = gain(there)
         candidates = sorted((
-            weighed(one, gain(there | {one.effect}) - known, chance)
+            weighed(one, gain(there | {one.effect}) - known,
+                    chance_fitted if one in fitted and chance_fitted is not None else chance)
             for one in (LATENCY, CURRENT, SAG) if one.effect not in there),
             key=lambda one: -one.gain)
         return None, Block(BASE, BASE.start, BASE.start, first_noise(KNOWN), tuple(candidates),
@@ -82,3 +83,11 @@ def test_recordings_are_fitted_again_with_what_a_nominal_robot_has_not() -> None
     names, fits = said(added(battery_sag=200.0, command_latency=90.0))
     assert names == ['battery_sag', 'command_latency']
     assert set(fits) == {(), ('battery_sag',)}
+
+
+@pytest.mark.parametrize(('before', 'fitted', 'names'), [
+    (0.05, 1e-6, ['battery_sag']), (1e-3, 0.05, [])])
+def test_what_a_nominal_robot_has_not_is_weighed_by_a_fit_with_it(
+        before: float, fitted: float, names: list[str]) -> None:
+    """Not by a derivative where there is none of it, whether that makes little or much of it."""
+    assert said(added(battery_sag=90.0), before, fitted)[0] == names
