@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+import itertools
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 import click
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
 
 @click.command(short_help='Run a blind trial of the diagnosis on robots with injected effects.')
@@ -103,8 +105,8 @@ def _trial(cases: int, seed: int | None, tuning: bool, world: str, jobs: int, ou
         plan.check_seeds(first, cases, report=not tuning)
         specs = plan.plan(cases, first, world, tuning)
         trial.keep_plan(folders, specs)
-        with click.progressbar(length=cases, label='hiding  ') as bar:
-            sealed = trial.prepare(folders, specs, jobs, lambda _: bar.update(1), held_out)
+        with _counted('made', cases) as one_more:
+            sealed = trial.prepare(folders, specs, jobs, lambda _: one_more(), held_out)
         name = 'tuning' if tuning else 'report'
         called = f'--cases {cases} --seed {first} --{name} --world {world}' \
             + ('' if held_out else ' --no-held-out')
@@ -117,14 +119,27 @@ def _trial(cases: int, seed: int | None, tuning: bool, world: str, jobs: int, ou
     if score_only:
         names = trial.diagnosed(folders, names)
     else:
-        with click.progressbar(length=len(names), label='diagnosing') as bar:
+        with _counted('diagnosed', len(names)) as one_more:
             for _ in trial.diagnose_all(folders, names, jobs):
-                bar.update(1)
+                one_more()
     lines = trial.opened(folders, sealed, names)
     outcomes.write(folders.outcomes, {
         'command': f'lg_husky prove {called} --out DIR', 'commit': trial.commit(),
         'planned': len(sealed), 'seal': seal, 'seeds': seeds, 'set': name}, lines)
     return folders.outcomes
+
+
+@contextmanager
+def _counted(what: str, number: int) -> Iterator[Callable[[], None]]:
+    # Yields what is to be called after each case: a bar, or a line a case without a terminal.
+    from lg_husky_sim.cli.common import Output
+
+    done = itertools.count(1)
+    with Output().stages() as report:
+        def one_more() -> None:
+            cases = next(done)
+            report(f'{what} {cases} of {number} cases', cases / number)
+        yield one_more
 
 
 def _report(trials: Sequence[tuple[Path, dict[str, Any], list[dict[str, Any]]]],

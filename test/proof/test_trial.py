@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -162,9 +163,11 @@ def test_the_command_line_names_both_sets_and_what_a_ruler_says(tmp_path: Path) 
 def test_cases_of_others_are_tried_as_they_are(
         prepared: trial.Folders, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     play(monkeypatch)
+    monkeypatch.setattr('lg_husky_sim.cli.common.BRIEF', 0.0)
     out = tmp_path / 'out'
     result = CliRunner().invoke(cli, ['prove', '--given', str(prepared.root), '--out', str(out)])
     assert result.exit_code == 0, result.output
+    assert re.findall(r'diagnosed (\d) of 2 cases', result.stderr) == ['1', '2'], 'a line a case'
     facts, lines = outcomes.read(out / 'outcomes.jsonl')
     assert facts['set'] == 'tuning', 'made by this generator'
     assert [line['case'] for line in lines] == ['case_0001', 'case_0002']
