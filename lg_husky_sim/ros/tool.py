@@ -46,6 +46,7 @@ class Orderly:
         self._before: dict[int, Any] = {}
         self._parent = os.getppid()
         self._asked = False
+        self._last: Tool | None = None
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self._asked = True
@@ -83,6 +84,17 @@ class Orderly:
         if self.over:
             raise Ended
 
+    def hand_over(self, tool: Tool | None) -> None:
+        """
+        Keep a tool in the graph until the next one has joined; leave with the one kept so far.
+
+        Fast DDS leaves the graph with the last node of a process, and is told of the others
+        again only within the 3 s of :data:`OTHERS`; a tool would miss what they say until then.
+        """
+        last, self._last = self._last, tool
+        if last is not None:
+            last.close()
+
 
 class Tool:
     """
@@ -104,6 +116,7 @@ class Tool:
         self.node = api.Node(name, namespace=namespace or '')
         self._executor = api.SingleThreadedExecutor()
         self._executor.add_node(self.node)
+        orderly.hand_over(None)
         self.simulated = bool(self.node.get_parameter('use_sim_time').value)
 
     def now(self) -> float:
@@ -195,6 +208,7 @@ def joined(arguments: Sequence[str] = ()) -> Iterator[Orderly]:
         except api.ROS_ERRORS as error:
             raise SettingsError(api.reason(error)) from error
         finally:
+            orderly.hand_over(None)
             api.try_shutdown()
 
 
@@ -233,12 +247,14 @@ def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wai
                 seen = True
                 end = time.monotonic() + OTHERS
             if time.monotonic() >= end:
+                orderly.hand_over(tool)
                 return robot
             until = time.monotonic() + LOOK
             while time.monotonic() < until:
                 tool.serve()
-    finally:
+    except BaseException:
         tool.close()
+        raise
 
 
 def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = None,

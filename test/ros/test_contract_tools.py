@@ -261,6 +261,24 @@ def test_a_second_robot_that_is_told_of_later_is_waited_for(
         choose(orderly, (), preset=preset)
 
 
+def test_the_graph_is_not_left_between_looking_and_serving(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fast DDS left it with the last node: a recorder of 1.5 s heard nothing every other time."""
+    left: list[str] = []
+    close = Tool.close
+
+    def closed(tool: Tool) -> None:
+        left.append(tool.node.get_name())
+        close(tool)
+    monkeypatch.setattr(Tool, 'close', closed)
+    with Orderly() as orderly:
+        choose(orderly, (), preset='paper', wait=0.0)
+        assert left == []
+        tool = Tool('lg_husky_recorder', orderly)
+        assert left == ['lg_husky_look']
+        tool.close()
+
+
 @pytest.mark.parametrize(('later', 'name'), [(0.5, '/rover'), (99.0, 'another node')])
 def test_playing_names_who_else_publishes(
         probe: Probe, monkeypatch: pytest.MonkeyPatch, later: float, name: str) -> None:
