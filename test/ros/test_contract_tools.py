@@ -13,15 +13,15 @@ import sys
 import time
 from typing import Any
 
-from lg_husky_sim.errors import CommandError, RecordingError, SettingsError
+from lg_husky_sim.errors import CommandError, RecordingError
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.ros import api, commands
 from lg_husky_sim.ros.commands import ZEROS
 from lg_husky_sim.ros.driver import drive
-from lg_husky_sim.ros.graph import Endpoint, find_robots, Robot, the_one
+from lg_husky_sim.ros.graph import Endpoint
 from lg_husky_sim.ros.player import play
 from lg_husky_sim.ros.settings import make_settings
-from lg_husky_sim.ros.tool import choose, Ended, Orderly, Tool
+from lg_husky_sim.ros.tool import Ended, Orderly, Tool
 from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.testing.live import LiveHusky, Probe, probed_domain
 import numpy as np
@@ -190,31 +190,6 @@ def test_a_tool_that_is_asked_to_end_says_so_once_signals_are_taken(probe: Probe
         assert api.ok()
 
 
-TOPICS = {
-    '/a200_0000/platform/cmd_vel': ['geometry_msgs/msg/TwistStamped'],
-    '/a200_0000/platform/odom': ['nav_msgs/msg/Odometry'],
-    '/a200_0000/sensors/imu_0/data': ['sensor_msgs/msg/Imu'],
-    '/turtle/joint_states': ['sensor_msgs/msg/JointState'],
-    '/turtle/imu/data': ['sensor_msgs/msg/Imu'],
-    '/odd/platform/cmd_vel': ['geometry_msgs/msg/Twist'],
-}
-
-
-def test_huskies_are_found_by_names_and_types_together() -> None:
-    """Row 17: another robot, or another type of the same name, is no Husky."""
-    robot = the_one(find_robots(TOPICS))
-    assert robot is not None
-    assert robot.words() == '--preset clearpath_jazzy --namespace /a200_0000'
-    assert find_robots(TOPICS, preset='paper') == ()
-    assert find_robots(TOPICS, namespace='a200_0000') == (robot,)
-    assert the_one(find_robots({})) is None
-    both = TOPICS | {f'/{make_settings(preset="husky_ros1").odometry_topic}': [
-        'nav_msgs/msg/Odometry'], '/imu/data': ['sensor_msgs/msg/Imu']}
-    with pytest.raises(SettingsError, match='2 Huskies are in the graph, choose one: --preset '
-                       'husky_ros1; --preset clearpath_jazzy --namespace /a200_0000'):
-        the_one(find_robots(both))
-
-
 def test_a_namespaced_robot_is_found_recorded_and_named_if_there_are_two(
         start: Callable[..., LiveHusky], probe: Probe, tmp_path: Path) -> None:
     """Row 17: /a200_0000 needs no option; of two, each is listed with its own."""
@@ -247,36 +222,6 @@ def test_a_namespaced_robot_is_found_recorded_and_named_if_there_are_two(
     assert '/a200_0000/platform/cmd_vel moves' in said
     assert 'at most 0.1 m/s' in said
     assert max(message.twist.linear.x for message in told) <= 0.1
-
-
-@pytest.mark.parametrize('preset', [None, 'clearpath_jazzy'])
-def test_a_second_robot_that_is_told_of_later_is_waited_for(
-        probe: Probe, monkeypatch: pytest.MonkeyPatch, preset: str | None) -> None:
-    """Fast DDS told of one of three robots 2 s before the others: a tool served that one."""
-    robots = [Robot('/a200_0000', 'clearpath_jazzy', 4), Robot('/a200_0001', 'clearpath_jazzy', 4)]
-    begun = time.monotonic()
-    monkeypatch.setattr('lg_husky_sim.ros.tool.find_robots', lambda topics, **only: tuple(
-        robots[:1 if time.monotonic() < begun + 2.5 else 2]))
-    with Orderly() as orderly, pytest.raises(SettingsError, match='2 Huskies are in the graph'):
-        choose(orderly, (), preset=preset)
-
-
-def test_the_graph_is_not_left_between_looking_and_serving(
-        probe: Probe, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fast DDS left it with the last node: a recorder of 1.5 s heard nothing every other time."""
-    left: list[str] = []
-    close = Tool.close
-
-    def closed(tool: Tool) -> None:
-        left.append(tool.node.get_name())
-        close(tool)
-    monkeypatch.setattr(Tool, 'close', closed)
-    with Orderly() as orderly:
-        choose(orderly, (), preset='paper', wait=0.0)
-        assert left == []
-        tool = Tool('lg_husky_recorder', orderly)
-        assert left == ['lg_husky_look']
-        tool.close()
 
 
 @pytest.mark.parametrize(('later', 'name'), [(0.5, '/rover'), (99.0, 'another node')])

@@ -1,0 +1,68 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How live tools look for the robot that they serve."""
+
+from __future__ import annotations
+
+import time
+
+from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.ros.graph import find_robots, Robot, the_one
+from lg_husky_sim.ros.settings import make_settings
+from lg_husky_sim.ros.tool import choose, Orderly, Tool
+from lg_husky_sim.testing.live import Probe
+import pytest
+
+TOPICS = {
+    '/a200_0000/platform/cmd_vel': ['geometry_msgs/msg/TwistStamped'],
+    '/a200_0000/platform/odom': ['nav_msgs/msg/Odometry'],
+    '/a200_0000/sensors/imu_0/data': ['sensor_msgs/msg/Imu'],
+    '/turtle/joint_states': ['sensor_msgs/msg/JointState'],
+    '/turtle/imu/data': ['sensor_msgs/msg/Imu'],
+    '/odd/platform/cmd_vel': ['geometry_msgs/msg/Twist'],
+}
+
+
+def test_huskies_are_found_by_names_and_types_together() -> None:
+    """Row 17: another robot, or another type of the same name, is no Husky."""
+    robot = the_one(find_robots(TOPICS))
+    assert robot is not None
+    assert robot.words() == '--preset clearpath_jazzy --namespace /a200_0000'
+    assert find_robots(TOPICS, preset='paper') == ()
+    assert find_robots(TOPICS, namespace='a200_0000') == (robot,)
+    assert the_one(find_robots({})) is None
+    both = TOPICS | {f'/{make_settings(preset="husky_ros1").odometry_topic}': [
+        'nav_msgs/msg/Odometry'], '/imu/data': ['sensor_msgs/msg/Imu']}
+    with pytest.raises(SettingsError, match='2 Huskies are in the graph, choose one: --preset '
+                       'husky_ros1; --preset clearpath_jazzy --namespace /a200_0000'):
+        the_one(find_robots(both))
+
+
+@pytest.mark.parametrize('preset', [None, 'clearpath_jazzy'])
+def test_a_second_robot_that_is_told_of_later_is_waited_for(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch, preset: str | None) -> None:
+    """Fast DDS told of one of three robots 2 s before the others: a tool served that one."""
+    robots = [Robot('/a200_0000', 'clearpath_jazzy', 4), Robot('/a200_0001', 'clearpath_jazzy', 4)]
+    begun = time.monotonic()
+    monkeypatch.setattr('lg_husky_sim.ros.tool.find_robots', lambda topics, **only: tuple(
+        robots[:1 if time.monotonic() < begun + 2.5 else 2]))
+    with Orderly() as orderly, pytest.raises(SettingsError, match='2 Huskies are in the graph'):
+        choose(orderly, (), preset=preset)
+
+
+def test_the_graph_is_not_left_between_looking_and_serving(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fast DDS left it with the last node: a recorder of 1.5 s heard nothing every other time."""
+    left: list[str] = []
+    close = Tool.close
+
+    def closed(tool: Tool) -> None:
+        left.append(tool.node.get_name())
+        close(tool)
+    monkeypatch.setattr(Tool, 'close', closed)
+    with Orderly() as orderly:
+        choose(orderly, (), preset='paper', wait=0.0)
+        assert left == []
+        tool = Tool('lg_husky_recorder', orderly)
+        assert left == ['lg_husky_look']
+        tool.close()
