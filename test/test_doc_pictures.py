@@ -24,7 +24,7 @@ PICTURES = DOCS / 'pictures'
 #: levels of 255: letters of another version of matplotlib move by a pixel, bars by more.
 BLOCK, ALIKE = 16, 30.0
 #: Files of outcomes that the page of the blind trial is made of.
-OUTCOMES = ('proof_report', 'proof_exam', 'proof_exam_2', 'proof_validation')
+OUTCOMES = ('proof_report', 'proof_exam', 'proof_exam_2', 'proof_exam_3', 'proof_validation')
 
 
 def blocks(path: Path) -> FloatArray:

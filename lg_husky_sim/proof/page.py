@@ -203,7 +203,7 @@ def _section(title: str, results: Json, trials: Sequence[Json], full: bool) -> l
     return parts
 
 
-TITLES = {'report': 'Reported trial', 'exam': 'Exams by another generator, each sat once',
+TITLES = {'report': 'Reported trial', 'exam': 'Exams by other generators, each sat once',
           'tuning': 'Tuning trial (seen while tuning: no proof)',
           'validation': 'Validation cases of another author (tuning data: no proof)'}
 
