@@ -308,7 +308,7 @@ def test_pull_slope_and_payload(robot: Maker) -> None:
 def test_sag_and_heat_weaken_the_motors(robot: Maker) -> None:
     """Both need current: a turn."""
     for effect, values in (('battery_sag', {'bus_resistance': 0.3}),
-                           ('motor_heating', {'heating_rate': 0.1})):
+                           ('motor_heating', {'heating_rate': 0.01})):
         base = last(robot(), TURN, 'yaw_rate')
         assert last(robot(effect, **values), TURN, 'yaw_rate') < base - 1e-4, effect
 

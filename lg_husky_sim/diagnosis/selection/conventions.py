@@ -19,48 +19,57 @@ from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.products import normal_matrix
 from lg_husky_sim.diagnosis.evidence.reading import imu_lag, Reading, wheel_lag, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import window_unknown
+from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 
-def best_reading(evidence: Evidence, fit: Fit, others: Sequence[Point] = ()) -> Fit:
+def best_reading(evidence: Evidence, fit: Fit, afresh: bool = False) -> Fit:
     """
     Choose the reading that makes a fitted model likeliest.
+
+    Numbers that took the place of a reading keep every other one from being likelier where they
+    are. So readings are fitted from the robot as it should be as well, if it is distorted.
 
     Parameters
     ----------
     evidence : Evidence
     fit : Fit
         Of the model.
-    others : sequence of Point
-        Where fits may begin as well: a fit may have taken the place of a reading.
+    afresh : bool
+        Whether to begin there in any case.
 
     Returns
     -------
     Fit
         With that reading, under the same noise; the given one where none is better.
     """
-    chosen = _better(evidence, fit, 'wheel_window', _wheel_options, others)
+    chosen = _better(evidence, fit, 'wheel_window', _wheel_options, afresh)
     return _better(evidence, chosen, 'imu_window', _imu_options)
 
 
 def _better(evidence: Evidence, fit: Fit, window: str,
             options_of: Callable[[Evidence, Reading], Sequence[Reading]],
-            others: Sequence[Point] = ()) -> Fit:
+            afresh: bool = False) -> Fit:
     options = options_of(evidence, fit.point.reading)
     if not options:
         return fit
-    chosen: list[Point] = []
-    for begin in (fit.point, *others):
-        points = [_read_so(evidence, begin, one) for one in options]
-        promised = evidence.pool.map(_promise_of(evidence, fit), points)
-        order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
-        chosen += [points[place] for place in order]
     # All by as many steps: what the same reading gains by them is not due to another one.
     rounds = int(setting('reading_rounds'))
-    tried = evidence.pool.map(
-        lambda point: evidence.fit(point, fit.slopes, rounds=rounds), chosen)
+    begins = [fit]
+    if afresh or is_distorted(fit):
+        start = nominal_of(fit.point)
+        begins.append(replace(evidence.fit(start, rounds=1), point=start))
+    tried: list[Fit] = []
+    for begin in begins:
+        points = [_read_so(evidence, begin.point, one) for one in options]
+        promised = evidence.pool.map(_promise_of(evidence, begin), points)
+        order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
+
+        def fitted(place: int, points: Sequence[Point] = points, begin: Fit = begin) -> Fit:
+            return evidence.fit(points[place], begin.slopes, rounds=rounds)
+        tried += evidence.pool.map(fitted, order)
     best = min(tried, key=lambda one: one.cost, default=fit)
     same = min(fit, evidence.fit(fit.point, rounds=rounds), key=lambda one: one.cost)
     if best.cost > same.cost - setting('reading_gain'):

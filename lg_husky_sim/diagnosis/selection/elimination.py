@@ -11,7 +11,7 @@ from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
 from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
 from lg_husky_sim.errors import LgHuskyError
 import numpy as np
 
@@ -19,7 +19,7 @@ import numpy as np
 def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hypothesis],
                first: float) -> tuple[Fit, list[Hypothesis]]:
     """
-    Drop adopted effects without which the others explain as much.
+    Drop adopted effects without which the others explain as much, as the log is read now.
 
     Parameters
     ----------
@@ -40,7 +40,8 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
     list of Hypothesis
     """
     kept = list(found)
-    while len(kept) > 1:
+    every = sum(len(one.trials()) for one in hypotheses(plain.structure))
+    while kept:
         tried = []
         for one in kept:
             try:
@@ -55,7 +56,8 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
         loss, fit, one = min(tried, key=lambda t: t[0])
         own = [place for place, unknown in enumerate(final.point.unknowns)
                if unknown.name in {p.name for p in one.free}]
-        chance = chance_of(loss, one, 1, evidence, dispersion(
+        # One of several is weighed beside the others; the last one was chosen among all.
+        chance = chance_of(loss, one, 1 if len(kept) > 1 else every, evidence, dispersion(
             evidence, final.whitened, final.jacobian[:, own]))
         if loss >= least_beside(one, first) and is_beyond_chance(chance):
             break

@@ -21,6 +21,7 @@ from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, neutral_of, Numbers
 from lg_husky_sim.diagnosis.selection.narrowing import narrowed
+from lg_husky_sim.diagnosis.selection.nominal import is_distorted
 from lg_husky_sim.diagnosis.selection.onsets import onset_looks, refined
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.selection.ties import is_near
@@ -174,11 +175,6 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
             continue
         found.append(Tried(hypothesis, best, base.cost - best.cost, evidence.count))
     return max(found, key=lambda one: one.gain, default=None)
-
-
-def is_distorted(base: Fit) -> bool:
-    """Return whether recalibrated numbers may have taken the place of an effect."""
-    return 0.5 * float(np.sum(base.point.prior_residuals ** 2)) >= setting('distorted')
 
 
 def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],

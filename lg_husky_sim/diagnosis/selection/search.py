@@ -17,12 +17,12 @@ from lg_husky_sim.diagnosis.evidence.unknowns import loosened, start_of, tick_un
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, Numbers
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.elimination import eliminated, with_effects
+from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.selection.rounds import (
     attempt,
     calibrated,
     fitted,
     forward_step,
-    is_distorted,
     numbers_of,
     Round,
     Tried,
@@ -87,8 +87,8 @@ class Logged:
     early: Sequence[Tried] = ()
 
 
-def _as_logged(evidence: Evidence, base: Fit, others: Sequence[Point] = ()) -> Logged:
-    chosen = best_reading(evidence, base, others)
+def _as_logged(evidence: Evidence, base: Fit, afresh: bool = False) -> Logged:
+    chosen = best_reading(evidence, base, afresh)
     if chosen is base:
         return Logged(base)
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
@@ -148,7 +148,7 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tri
             best.hypothesis, best.fit.point.places[:len(names)], numbers_of(best))]))
     elif is_distorted(base):
         found.append(read_anew(first, base, logged.early))
-        nominal = _nominal(base.point)
+        nominal = nominal_of(base.point)
         first = first.about(nominal)
         rough = first.fit(nominal, rounds=1)
         pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
@@ -243,8 +243,8 @@ def recalibrated(evidence: Evidence, start: Point) -> Recalibrated:
     stamped, point = likeliest_stamps(evidence, rough)
     if stamped is not evidence:
         evidence, rough = stamped, stamped.fit(point, rounds=1)
-    logged = _as_logged(evidence, rough, [_nominal(rough.point)])
-    start = _nominal(logged.fit.point)
+    logged = _as_logged(evidence, rough, afresh=True)
+    start = nominal_of(logged.fit.point)
     return Recalibrated(evidence, rough, logged, *calibrated(evidence.about(start), start))
 
 
@@ -268,22 +268,13 @@ def at_ticks(known: Recalibrated, start: Point, progress: Progress) -> Recalibra
     return None if is_distorted(other.base) else other
 
 
-def _nominal(point: Point) -> Point:
-    # The robot as it should be, with the effects of a point and read like it.
-    centres = start_of(point.unknowns)
-    for place, unknown in enumerate(point.unknowns):
-        if unknown.kind != 'model':
-            centres[place] = point.places[place]
-    return point.at(centres)
-
-
 def _settled(evidence: Evidence, point: Point, first: Evidence) -> tuple[Evidence, Fit]:
     # The likeliest numbers and noise of an adopted structure: where they began far from the robot
     # as it should be, since the base had absorbed the effect, from there, too, and from there
     # with a log that was made as most are, under a first guess of the noise.
     found = [calibrated(evidence, point, 1)]
     if is_distorted(found[0][1]):
-        start = _nominal(found[0][1].point)
+        start = nominal_of(found[0][1].point)
         found.append(calibrated(evidence.about(start), start))
         start = as_usual(start)
         own, fit = calibrated(first.about(start), start)
@@ -340,7 +331,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     postponed = bool(logged.better)
     evidence, base = _read_as(evidence, base, logged.fit)
     usual = Reading()
-    start = _nominal(base.point)
+    start = nominal_of(base.point)
     plain = base
     rounds: list[Round] = []
     found: list[Hypothesis] = []
@@ -365,7 +356,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
                     evidence, base = otherwise
                     chosen, otherwise = best_reading(evidence, base), None
                 evidence, base = _read_as(evidence, base, chosen)
-                start = _nominal(base.point)
+                start = nominal_of(base.point)
                 continue
         rounds.append(one)
         if number == 0:
@@ -379,9 +370,10 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
             postponed = False
-    if len(found) > 1:
+    if len(found) > 1 or (found and base.point.reading != rounds[0].base.point.reading):
         base, kept = eliminated(evidence, plain.point, base, found, first)
         rounds = [r for r, h in zip(rounds, found, strict=False) if h in kept] + rounds[
             len(found):]
         found = kept
+        plain = plain if found else base
     return Search(plain, base, evidence, tuple(rounds), tuple(found))

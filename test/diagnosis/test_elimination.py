@@ -1,0 +1,44 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What was adopted goes again where it is not needed as the log is read in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
+from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
+from lg_husky_sim.diagnosis.selection.elimination import eliminated
+from lg_husky_sim.diagnosis.selection.rounds import calibrated
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import Recording
+from lg_husky_sim.threads import Threads
+import pytest
+
+
+@pytest.mark.parametrize(('hidden', 'kept'), [
+    ('nothing', []), ('electrical', ['battery_sag']), ('command', ['command_latency'])])
+def test_one_effect_is_kept_only_if_it_is_needed(
+        drive: Callable[..., Recording], hidden: str, kept: list[str]) -> None:
+    """A sag and a delay on robots that have both, one, or none of them."""
+    recording, model = drive('ahead', hidden, 1), load_model()
+    drives = drives_of([recording])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    found = []
+    point = start
+    for name in ('battery_sag', 'command_latency'):
+        one = next(h for h in hypotheses(point.structure) if h.effect.id == name)
+        point = one.point(point, one.starts[0])
+        found.append(one)
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, [recording.name], start, first_guess(drives), pool)
+        evidence, final = calibrated(evidence, point, 1)
+        fit, needed = eliminated(evidence, start, final, found, 0.0)
+    assert [one.effect.id for one in needed] == kept
+    assert [effect.id for effect in fit.point.structure.effects] == kept
