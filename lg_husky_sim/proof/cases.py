@@ -159,18 +159,23 @@ def _setting(name: str, severity: str, hidden: Hidden, case: oracle.Drives,
         np.abs(commands[:, 0]) + fields['turn_ratio'] * np.abs(commands[:, 1]))
     steepest = max(float(np.abs(np.diff(drive.commands, axis=0)).max())
                    for drive in case.drives) * case.how.link.rate
-    squares, peaks = [10.0], []
+    squares, peaks, charges = [10.0], [], [1.0]
     for k, drive in enumerate(case.drives):
         table = run(alone(hidden), drive, case.sent[k], case.how, case.poses[k], None,
                     step=oracle.step_of(hidden))
         currents = table[:, COLUMNS.index('current_left'):COLUMNS.index('current_right') + 1]
         squares.append(float((currents ** 2).sum(axis=0).max() * (table[1, 0] - table[0, 0])))
         peaks.append(float(np.abs(currents).max()))
+        # By the power of both motors: what choppers draw is less than what motors do.
+        volts_at = fields['resistance'] * currents + fields['torque_constant'] * table[
+            :, COLUMNS.index('wheel_left'):COLUMNS.index('wheel_right') + 1]
+        charges.append(float((volts_at * currents).sum() * (table[1, 0] - table[0, 0])
+                             / fields['supply']))
     return Setting(
         fields, size_of(name, catalogue.SEVERITIES.index(severity), rng),
         float(np.abs(commands[:, 0]).max()), float(np.abs(commands[:, 1]).max()),
         float(min(volts.max(), fields['supply'])), min(steepest, 20.0), max(squares), max(peaks),
-        max(drive.duration for drive in case.drives), case.how.streams,
+        max(charges), max(drive.duration for drive in case.drives), case.how.streams,
         conventions.left_out('forms', tuning))
 
 

@@ -38,8 +38,7 @@ def _battery_droop(s: Setting, rng: Rng) -> Change:
     if form == 1.0:
         time = s.seconds
     elif form == 2.0:
-        # Mean |current| of such drives is about 4 A on each side.
-        depth = 1000.0 * s.size / (8.0 * s.seconds)
+        depth = 1000.0 * s.size / s.drawn_charge
     return Change({'droop_depth': depth, 'droop_time': time, 'form_droop': form},
                   parameters={'final_loss_fraction': s.size}, form=name)
 

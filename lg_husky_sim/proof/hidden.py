@@ -32,6 +32,8 @@ class Setting:
     squared_current, peak_current
         Integral of i² over the longest manoeuvre, and largest |i|, without the effect, the
         larger of both sides [A²·s], [A].
+    drawn_charge
+        What the manoeuvre that draws most takes from the battery, without the effect [A·s].
     seconds
         Length of the longest manoeuvre [s].
     streams
@@ -49,6 +51,7 @@ class Setting:
     steepest: float = 20.0
     squared_current: float = 400.0
     peak_current: float = 20.0
+    drawn_charge: float = 20.0
     seconds: float = 60.0
     streams: tuple[str, ...] = ('wheels', 'imu', 'pose')
     left_out: frozenset[str] = frozenset()

@@ -117,6 +117,21 @@ def test_a_strong_effect_shows_where_it_should(effect: str) -> None:
     assert max(value for name, value in found.items() if name.startswith(where)) > LEAST[where]
 
 
+def test_a_battery_loses_by_its_charge_what_the_answer_says() -> None:
+    """It lost a hundredth of that, by a current that such drives were thought to draw."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        spec = cases.Spec(seed, 'single', effects=('battery_droop',), severity='strong',
+                          onset='none')
+        hidden, told, _ = cases.conceal(spec, robots.open_loop_robot(rng), a_case(),
+                                        ('battery_droop',), ('strong',), rng)
+        if told[0]['form'] == 'charge':
+            break
+    table = go(hidden)
+    lost = 1.0 - table[-1, COLUMNS.index('bus')] / hidden.fields['supply']
+    assert lost == pytest.approx(told[0]['parameters']['final_loss_fraction'], rel=0.2)
+
+
 @pytest.mark.parametrize('effect', ['coulomb_drivetrain', 'payload', 'command_latency',
                                     'yaw_scrub_coulomb', 'gyro_bias'])
 def test_a_stronger_effect_is_worth_more_to_the_oracle(effect: str) -> None:
