@@ -221,12 +221,17 @@ def _remaining(found: Search, rest: Sequence[Effort]) -> str:
 def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
            ) -> tuple[str, ...]:
     notes = []
+    made = reading_notes(found.evidence.drives, found.final.point.log)
     worse = [name for name in plain if name in augmented
              and augmented[name] > (1.0 + setting('worse')) * plain[name]] if found.found else []
     if worse:
         notes.append('held-out errors that grow with the finding: '
                      + ', '.join(f'{quantity_with_unit(name)} from {plain[name]:.3g} to '
                                  f'{augmented[name]:.3g}' for name in worse))
+    if any(name in worse and any(note.startswith(rates) for note in made) for name, rates in (
+            ('wheel_speed_rmse', 'wheel rates'), ('yaw_rate_rmse', 'yaw rates'))):
+        notes.append('these are errors of the rates themselves, not of what this log makes of '
+                     'them (below), which numbers of the recalibrated model may stand for')
     most = setting('most_tolerances')
     moved = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.prior_residuals,
                                     strict=True) if abs(s) > most and u.kind == 'model']
@@ -234,7 +239,7 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
         notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(moved)
                      + '; check that the model is one of this robot')
     notes += log_notes(found.evidence.drives)
-    notes += reading_notes(found.evidence.drives, found.final.point.log)
+    notes += made
     values = found.evidence.noise.values
     notes.append(f'estimated disturbances (standard deviation): force {values["force"]:.2g} '
                  f'N, yaw moment {values["moment"]:.2g} N·m, torque on the wheels of each side '
