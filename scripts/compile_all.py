@@ -9,11 +9,14 @@ Put the machine code of every kernel on disk, so that no test has to wait for th
 from __future__ import annotations
 
 from lg_husky_sim import Husky
+from lg_husky_sim.jit import compiled
 from lg_husky_sim.simulation.compiling import compile_here
 
 
 def main() -> None:
     """Simulate, diagnose, and compare with a baseline, once each and briefly."""
+    if not compiled():
+        return
     compile_here()
     husky = Husky()
     drives = [husky.simulate(name) for name in ('s_bend', 'circle')]

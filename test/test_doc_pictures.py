@@ -10,6 +10,9 @@ import shutil
 
 from click.testing import CliRunner
 from lg_husky_sim.cli.main import cli
+from lg_husky_sim.proof import outcomes
+from lg_husky_sim.proof.scoring import judge
+from lg_husky_sim.proof.summary import rates
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 import pytest
@@ -139,3 +142,27 @@ def test_each_picture_stands_on_a_page_with_its_command() -> None:
     assert source['diagnosis.png'].startswith('lg_husky diagnose husky_wet_grass')
     assert source['compare_tile_responses.png'] == source['compare_tile_trajectory.png'] == (
         'lg_husky compare husky_wet_grass husky_deflated_tile --out result')
+
+
+def test_the_readme_counts_what_the_outcomes_of_all_trials_and_exams_say() -> None:
+    """Each sum is that of the files of outcomes."""
+    trials = sorted(DOCS.glob('proof_report*.jsonl'))
+    exams = sorted(DOCS.glob('proof_exam*.jsonl'))
+    asked = {'named': 'single effects: named right', 'changed': 'what changed: named right',
+             'flagged': 'clean robots: named, called unknown or failed (false alarm)',
+             'unchanged': 'what changed: an unchanged robot flagged'}
+
+    def counted(files: list[Path], question: str) -> str:
+        found = rates([judge(row) for path in files for row in outcomes.read(path)[1]])
+        rate = next(one for one in found if one.name == asked[question])
+        return f'{rate.hits:g} of {rate.count}'
+    text = ' '.join(passage(ROOT / 'README.md', 'successive [blind trials]', '- Without').split())
+    last = [DOCS / 'proof_report.jsonl']
+    for claim in (
+            f'named {counted(trials, "named")} single effects ({counted(last, "named")} in the',
+            f'alarms on {counted(trials, "flagged")} clean robots ({counted(last, "flagged")})',
+            f'it named {counted(last, "changed")} in the last one',
+            f'named {counted(exams, "named")} single effects and {counted(exams, "changed")} ch',
+            f'alarms on {counted(exams, "flagged")} clean robots',
+            f'called {counted(exams, "unchanged")} unchanged robots changed'):
+        assert claim in text

@@ -12,9 +12,10 @@ from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
 from lg_husky_sim.diagnosis.selection.elimination import eliminated
-from lg_husky_sim.diagnosis.selection.rounds import calibrated
+from lg_husky_sim.diagnosis.selection.rounds import calibrated, Round
+from lg_husky_sim.diagnosis.selection.search import _without_the_dropped
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.threads import Threads
@@ -42,3 +43,24 @@ def test_one_effect_is_kept_only_if_it_is_needed(
         fit, needed = eliminated(evidence, start, final, found, 0.0)
     assert [one.effect.id for one in needed] == kept
     assert [effect.id for effect in fit.point.structure.effects] == kept
+
+
+def test_a_round_is_left_where_all_that_was_found_is_dropped(
+        drive: Callable[..., Recording]) -> None:
+    """Else nothing would say how far the best that was looked at is beyond chance."""
+    drives = drives_of([drive('ahead', 'nothing', 1)])
+    model = load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        fit = evidence.fit(start, rounds=0)
+    first, second, last = (Round(evidence, fit, (), adopted, chance) for adopted, chance in (
+        (True, 1e-9), (True, 1e-3), (False, 0.5)))
+    one, other = hypotheses(model.structure)[:2]
+
+    def left(rounds: list[Round], kept: list[Hypothesis]) -> list[tuple[bool, float]]:
+        return [(r.adopted, r.chance) for r in _without_the_dropped(rounds, [one, other], kept)]
+    assert left([first, second, last], [other]) == [(True, 1e-3), (False, 0.5)]
+    assert left([first, second, last], []) == [(False, 0.5)]
+    assert left([first, second], []) == [(False, 1e-3)]

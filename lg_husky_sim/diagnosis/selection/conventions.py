@@ -59,17 +59,17 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     rounds = int(setting('reading_rounds'))
     begins = [fit]
     if afresh or is_distorted(fit):
+        # One step takes the derivatives there.
         start = nominal_of(fit.point)
         begins.append(replace(evidence.fit(start, rounds=1), point=start))
-    tried: list[Fit] = []
+    chosen: list[tuple[Point, Fit]] = []
     for begin in begins:
         points = [_read_so(evidence, begin.point, one) for one in options]
         promised = evidence.pool.map(_promise_of(evidence, begin), points)
         order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
-
-        def fitted(place: int, points: Sequence[Point] = points, begin: Fit = begin) -> Fit:
-            return evidence.fit(points[place], begin.slopes, rounds=rounds)
-        tried += evidence.pool.map(fitted, order)
+        chosen += [(points[place], begin) for place in order]
+    tried = evidence.pool.map(
+        lambda one: evidence.fit(one[0], one[1].slopes, rounds=rounds), chosen)
     best = min(tried, key=lambda one: one.cost, default=fit)
     same = min(fit, evidence.fit(fit.point, rounds=rounds), key=lambda one: one.cost)
     if best.cost > same.cost - setting('reading_gain'):

@@ -293,6 +293,13 @@ def as_usual(point: Point) -> Point:
     return replace(point, reading=Reading(), unknowns=unknowns, places=places)
 
 
+def _without_the_dropped(rounds: Sequence[Round], found: Sequence[Hypothesis],
+                         kept: Sequence[Hypothesis]) -> list[Round]:
+    # There is always one that says what was looked at last, adopted or not.
+    left = [r for r, h in zip(rounds, found, strict=False) if h in kept]
+    return [*left, *rounds[len(found):]] or [replace(rounds[-1], adopted=False)]
+
+
 def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     """
     Find what a model lacks.
@@ -372,8 +379,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             postponed = False
     if len(found) > 1 or (found and base.point.reading != rounds[0].base.point.reading):
         base, kept = eliminated(evidence, plain.point, base, found, first)
-        rounds = [r for r, h in zip(rounds, found, strict=False) if h in kept] + rounds[
-            len(found):]
+        rounds = _without_the_dropped(rounds, found, kept)
         found = kept
         plain = plain if found else base
     return Search(plain, base, evidence, tuple(rounds), tuple(found))
