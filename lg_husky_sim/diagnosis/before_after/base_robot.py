@@ -25,7 +25,7 @@ ROBOT: Final = (
     'mass', 'yaw_inertia', 'com_x', 'com_y', 'com_height', 'radius_left', 'radius_right',
     'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak', 'reference_lag',
     'drag', 'pull', 'scrub', 'scrub_speed', 'dead_voltage', 'bus_resistance', 'droop_rate',
-    'windup')
+    'windup', 'stiffness_ratio')
 #: Numbers that are not estimated.
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
                 'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate', 'least_share',
@@ -35,7 +35,7 @@ FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
 OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'accel_y',
                   'x', 'y', 'heading', 'angle_left', 'angle_right')
 #: Rows of what the integrator works on.
-ROWS: Final = len(ROBOT) + 51
+ROWS: Final = len(ROBOT) + 53
 # Their places, each with a lane for each robot: parameters, as above; state; and what is worked
 # out within a step. Two one after the other are left and right, four the tyres: front left, rear
 # left, front right, rear right.
@@ -43,12 +43,12 @@ ROWS: Final = len(ROBOT) + 51
  _V_MAX, _I_MAX, _INERTIA, _DRY, _, _VISCOUS, _, _MU_ALONG, _MU_ACROSS, _CREEP, _SHARE, _ROLLING,
  _YAW_DAMPING, _MASS, _TURNING, _COM_X, _COM_Y, _HEIGHT, _RADIUS, _, _SLOPE_X, _SLOPE_Y, _TRACK,
  _DEFLECTION, _LEAK, _LAG, _DRAG, _PULL, _SCRUB, _SCRUB_SPEED, _DEAD, _BUS_RESISTANCE, _DROOP,
- _WINDUP,
+ _WINDUP, _RATIO,
  _V, _U, _R, _WHEEL, _, _SLOW_V, _SLOW_W, _ACC_X, _ACC_Y, _HELD, _,
  _ALONG, _, _, _, _ACROSS, _, _, _,
  _A00, _A02, _A11, _A12, _A22, _B0, _B1, _B2, _FRONT, _LEFT, _GX, _GY, _BUS,
  _SOFT, _, _, _, _A, _, _FIXED, _, _VOLTS, _, _WANTED, _, _D, _, _NW, _,
- _FOLLOW, _BUILD, _KEPT) = range(ROWS)
+ _FOLLOW, _BUILD, _KEPT, _STIFF_ALONG, _STIFF_ACROSS) = range(ROWS)
 
 
 @jit_part
@@ -66,6 +66,8 @@ def _begin(z: FloatArray, p: FloatArray, start: FloatArray, fixed: FloatArray, s
             z[i, j] = p[i, j]
         z[_BUILD, j] = step / z[_DEFLECTION, j]
         z[_KEPT, j] = np.exp(-z[_LEAK, j] * step)
+        z[_STIFF_ALONG, j] = np.sqrt(z[_RATIO, j])
+        z[_STIFF_ACROSS, j] = 1.0 / z[_STIFF_ALONG, j]
         z[_FOLLOW, j] = 1.0 - np.exp(-step / z[_LAG, j])
         z[_V, j] = start[0, j] - start[2, j] * z[_COM_Y, j]
         z[_U, j] = start[1, j] + start[2, j] * z[_COM_X, j]
@@ -149,16 +151,18 @@ def _tyre(z: FloatArray, s: int, f: int, fixed: FloatArray) -> None:
         load = z[_MASS, j] * gravity * (left if s == 0 else 1.0 - left) * (
             front if f == 0 else 1.0 - front)
         rolled, r, build = z[_RADIUS + s, j] * z[_WHEEL + s, j], z[_R, j], z[_BUILD, j]
-        sx = (z[_V, j] - r * y - rolled) / z[_MU_ALONG, j]
-        sy = (z[_U, j] + r * x) / z[_MU_ACROSS, j]
+        stiff_x, stiff_y = z[_STIFF_ALONG, j], z[_STIFF_ACROSS, j]
+        sx = stiff_x * (z[_V, j] - r * y - rolled) / z[_MU_ALONG, j]
+        sy = stiff_y * (z[_U, j] + r * x) / z[_MU_ACROSS, j]
         edge = z[_CREEP, j] + z[_SHARE, j] * abs(rolled)
         soft = 1.0 + build * (np.sqrt(sx * sx + sy * sy) + edge)
-        c = load * build / soft
+        c = stiff_y * load * build / soft
+        a = stiff_x * load * build / soft
         ox = load * z[_ALONG + i, j] / soft
         oy = load * z[_ACROSS + i, j] / soft
         z[_SOFT + i, j] = soft
         z[_FIXED + s, j] = ox if f == 0 else z[_FIXED + s, j] + ox
-        z[_A + s, j] = c if f == 0 else z[_A + s, j] + c
+        z[_A + s, j] = a if f == 0 else z[_A + s, j] + a
         z[_B0, j] -= ox
         z[_B1, j] -= oy
         z[_B2, j] += ox * y - oy * x
@@ -280,9 +284,10 @@ def _bent(z: FloatArray, s: int, f: int, half: float) -> None:
         y = (0.5 if s == 0 else -0.5) * z[_TRACK, j] - z[_COM_Y, j]
         x = (half if f == 0 else -half) - z[_COM_X, j]
         build, soft, r = z[_BUILD, j], z[_SOFT + i, j], z[_R, j]
-        z[_ALONG + i, j] = (z[_ALONG + i, j] + build * (
+        z[_ALONG + i, j] = (z[_ALONG + i, j] + build * z[_STIFF_ALONG, j] * (
             z[_V, j] - r * y - z[_RADIUS + s, j] * z[_WHEEL + s, j])) / soft
-        z[_ACROSS + i, j] = (z[_ACROSS + i, j] + build * (z[_U, j] + r * x)) / soft
+        z[_ACROSS + i, j] = (z[_ACROSS + i, j] + build * z[_STIFF_ACROSS, j] * (
+            z[_U, j] + r * x)) / soft
 
 
 @jit_part
