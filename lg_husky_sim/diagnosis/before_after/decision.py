@@ -147,6 +147,37 @@ def claim(change: Change, body: Block | None, loop: Block, settings: Settings) -
     return None
 
 
+def foremost(body: Block | None, loop: Block, settings: Settings) -> Decision | None:
+    """
+    Return the change that makes up most of a difference beyond chance, if there is one.
+
+    Few recordings can be parted in few ways, and then no single gain is beyond chance, while the
+    difference of everything is. Which name it has is a question of evidence then, not of chance.
+
+    Parameters
+    ----------
+    body : Block or None
+    loop : Block
+    settings : Settings
+
+    Returns
+    -------
+    Decision or None
+        None where there is no difference beyond chance, or no name explains more of it than it
+        leaves, and more than any other name.
+    """
+    numbers = _shared(body, settings)
+    surest = _differing(body, loop, numbers)
+    if surest is None or not surest.candidates:
+        return None
+    first = surest.candidates[0]
+    others = _best_of_names(surest.candidates, first.change.effect)
+    if first.gain < numbers['foremost_share'] * surest.anything or any(
+            first.gain - one.gain < numbers['tie'] for one in others):
+        return None
+    return _claimed(first, surest.candidates, settings, numbers)
+
+
 def unnamed(body: Block | None, loop: Block, explained: float, settings: Settings
             ) -> Decision | None:
     """
@@ -166,15 +197,21 @@ def unnamed(body: Block | None, loop: Block, explained: float, settings: Setting
         None where there is no difference beyond chance, or what is claimed explains enough of it.
     """
     numbers = _shared(body, settings)
-    blocks = [block for block in (body, loop) if block is not None]
-    surest = min(blocks, key=lambda block: block.chance if block.anything > 0.0 else 1.0)
-    if surest.anything <= 0.0 or surest.chance >= numbers['false_alarm_rate'] or (
-            explained >= numbers['unknown_share'] * surest.anything):
+    surest = _differing(body, loop, numbers)
+    if surest is None or explained >= numbers['unknown_share'] * surest.anything:
         return None
-    everything = sorted((one for block in blocks for one in block.candidates),
-                        key=lambda one: -one.gain)
+    everything = sorted((one for block in (body, loop) if block is not None
+                         for one in block.candidates), key=lambda one: -one.gain)
     return Decision(None, _best_of_names(everything, ''), (),
                     _likely('change', surest.chance, numbers), surest.anything, surest.chance)
+
+
+def _differing(body: Block | None, loop: Block, numbers: Mapping[str, float]) -> Block | None:
+    # The block whose difference of everything is the surest, if it is beyond chance.
+    surest = min((block for block in (body, loop) if block is not None),
+                 key=lambda block: block.chance if block.anything > 0.0 else 1.0)
+    differs = surest.anything > 0.0 and surest.chance < numbers['false_alarm_rate']
+    return surest if differs else None
 
 
 def _shared(body: Block | None, settings: Settings) -> dict[str, float]:

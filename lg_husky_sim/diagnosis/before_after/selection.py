@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
-from lg_husky_sim.diagnosis.before_after.decision import claim, decide, Decision, unnamed
+from lg_husky_sim.diagnosis.before_after.decision import claim, decide, Decision, foremost, unnamed
 from lg_husky_sim.diagnosis.before_after.settings import Change, Settings
 
 #: What both blocks say (of the body only where the recordings have what it takes) where some
@@ -63,8 +63,11 @@ def select(compared: Compared, settings: Settings) -> Selection:
         block.candidates[0].change for block in (body, loop)
         if block is not None and block.candidates and block.candidates[0].gain > 0.0], settings))
     adopted: list[Change] = []
-    decisions: tuple[Decision, ...] = (decide(body, loop, settings),)
-    latest = decisions[0].named
+    first = decide(body, loop, settings)
+    if first.named is None:
+        first = foremost(body, loop, settings) or first
+    decisions: tuple[Decision, ...] = (first,)
+    latest = first.named
     while latest is not None and latest.change not in adopted:
         adopted.append(latest.change)
         if len(adopted) == int(settings.decision['changes_at_once']):

@@ -29,8 +29,13 @@ def weighed(change: Change, gain: float, chance: float) -> Candidate:
 
 
 def said(gain: Callable[[frozenset[str]], float], chance: float = 1e-6,
-         chance_fitted: float | None = None) -> tuple[list[str], list[tuple[str, ...]]]:
-    """Return what is named where sets of changes gain so much together, and what was fitted."""
+         chance_fitted: float | None = None, anything: float = 0.0
+         ) -> tuple[list[str], list[tuple[str, ...]]]:
+    """
+    Return what is named where sets of changes gain so much together, and what was fitted.
+
+    Everything gains `anything`, beyond chance unless that is nothing.
+    """
     fits: list[tuple[str, ...]] = []
 
     def compared(adopted: tuple[Change, ...], fitted: tuple[Change, ...]) -> tuple[None, Block]:
@@ -43,9 +48,10 @@ def said(gain: Callable[[frozenset[str]], float], chance: float = 1e-6,
             for one in (LATENCY, CURRENT, SAG) if one.effect not in there),
             key=lambda one: -one.gain)
         return None, Block(BASE, BASE.start, BASE.start, first_noise(KNOWN), tuple(candidates),
-                           known, 0.0, 1.0)
+                           known, anything, 1e-6 if anything else 1.0)
     found = select(remembered(compared), KNOWN).decisions
-    return [one.named.change.effect for one in found if one.named is not None], fits
+    return ['unknown' if one.named is None else one.named.change.effect for one in found
+            if one.named is not None or one.unknown > 0.0], fits
 
 
 def added(**gains: float) -> Callable[[frozenset[str]], float]:
@@ -91,3 +97,13 @@ def test_what_a_nominal_robot_has_not_is_weighed_by_a_fit_with_it(
         before: float, fitted: float, names: list[str]) -> None:
     """Not by a derivative where there is none of it, whether that makes little or much of it."""
     assert said(added(battery_sag=90.0), before, fitted)[0] == names
+
+
+@pytest.mark.parametrize(('latency', 'current', 'name'), [
+    (10.0, 130.0, 'current_limit'), (10.0, 90.0, 'unknown'), (128.0, 130.0, 'unknown')])
+def test_of_a_difference_beyond_chance_the_name_that_makes_up_most_is_said(
+        latency: float, current: float, name: str) -> None:
+    """Though its own gain is not beyond chance: if it explains most, and more than others do."""
+    gains = added(command_latency=latency, current_limit=current)
+    assert said(gains, chance=0.05, anything=200.0)[0] == [name]
+    assert said(gains, chance=0.05)[0] == []
