@@ -26,8 +26,10 @@ PICTURES = DOCS / 'pictures'
 #: Side of the blocks whose means are compared [pixels], and the largest difference in grey
 #: levels of 255: letters of another version of matplotlib move by a pixel, bars by more.
 BLOCK, ALIKE = 16, 30.0
-#: Files of outcomes that the page of the blind trial is made of.
-OUTCOMES = ('proof_report', 'proof_exam', 'proof_exam_2', 'proof_exam_3', 'proof_validation')
+#: Files of outcomes that the page of the blind trial is made of: the report of today, the exams,
+#: earlier reports.
+OUTCOMES = ('proof_report', 'proof_exam', 'proof_exam_2', 'proof_exam_3', 'proof_exam_4', *sorted((
+    path.stem for path in DOCS.glob('proof_report_*.jsonl')), reverse=True), 'proof_validation')
 
 
 def blocks(path: Path) -> FloatArray:

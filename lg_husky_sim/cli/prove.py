@@ -154,11 +154,15 @@ def _report(trials: Sequence[tuple[Path, dict[str, Any], list[dict[str, Any]]]],
     from lg_husky_sim.proof.summary import summarise
 
     sections: dict[str, tuple[dict[str, Any], list[dict[str, Any]]]] = {}
+    judged = [(facts, [judge(row) for row in rows]) for _, facts, rows in trials]
+    # The figures of a report are those of one state: that of the report which is given first.
+    state = next((facts['commit'] for facts, _ in judged if facts['set'] == 'report'), None)
     for name in pages.TITLES:
-        ours = [(facts, rows) for _, facts, rows in trials if facts['set'] == name]
+        ours = [(facts, cases) for facts, cases in judged if facts['set'] == name
+                and (name != 'report' or facts['commit'] == state)]
         if ours:
-            results = summarise([judge(row) for _, rows in ours for row in rows])
-            sections[name] = (results, [{**facts, 'cases': len(rows)} for facts, rows in ours])
+            results = summarise([case for _, cases in ours for case in cases])
+            sections[name] = (results, [{**facts, 'cases': len(cases)} for facts, cases in ours])
             click.echo(f'{pages.TITLES[name]}\n\n{pages.text_of(results)}', nl=False)
     if page is None:
         return
@@ -171,7 +175,10 @@ def _report(trials: Sequence[tuple[Path, dict[str, Any], list[dict[str, Any]]]],
     shown = [str(path.relative_to(page.parent.parent)) if path.is_relative_to(page.parent.parent)
              else path.name for path in (one.resolve() for one in kept)] \
         if (page := page.resolve()) else []
-    pages.write_text(page, pages.page_of(sections, shown, drawable))
+    once = [one for one in judged if one[0]['set'] in ('report', 'exam')]
+    pages.write_text(page, pages.page_of(
+        sections, shown, drawable, [(facts, summarise(cases)) for facts, cases in once],
+        summarise([case for _, cases in once for case in cases]) if len(once) > 1 else None))
     if drawable:
         draw(next(iter(sections.values()))[0], page.parent / 'pictures')
     else:

@@ -208,8 +208,32 @@ TITLES = {'report': 'Reported trial', 'exam': 'Exams by other generators, each s
           'validation': 'Validation cases of another author (tuning data: no proof)'}
 
 
+_HISTORY = {'single effects': 'single effects: named right', 'pairs, both': 'pairs: both right',
+            'clean, flagged': 'clean robots: named, called unknown or failed (false alarm)',
+            'outside the catalogue': 'outside the catalogue: unknown, or part right',
+            'changes': 'what changed: named right',
+            'unchanged, flagged': 'what changed: an unchanged robot flagged'}
+
+
+def _history(history: Sequence[tuple[Json, Json]], whole: Json) -> list[str]:
+    def cells(results: Json) -> list[str]:
+        found = {rate['name']: rate for rate in results['rates']}
+        error = results['reliability']['error']
+        return [str(results['cases']), *(
+            _count(found[name]) if found[name]['count'] else '-' for name in _HISTORY.values()),
+            _number(error)]
+    rows = [[facts['set'], facts['seeds'], f'`{facts["commit"][:12]}`', *cells(results)]
+            for facts, results in history]
+    return ['## All reported trials and exams', '',
+            'Each was diagnosed once, by the state of its commit, and has been tuning data since.',
+            'The sum is over all these states.', '',
+            _markdown(('set', 'seeds', 'commit', 'cases', *_HISTORY, 'calibration error'),
+                      [*rows, ['sum', '', '', *cells(whole)]]), '']
+
+
 def page_of(sections: Mapping[str, tuple[Json, Sequence[Json]]], sources: Sequence[str],
-            pictures: bool = True) -> str:
+            pictures: bool = True, history: Sequence[tuple[Json, Json]] = (),
+            whole: Json | None = None) -> str:
     """
     Return the page.
 
@@ -222,6 +246,10 @@ def page_of(sections: Mapping[str, tuple[Json, Sequence[Json]]], sources: Sequen
         Files of outcomes, as the reader of the page finds them.
     pictures
         Refer to the pictures.
+    history
+        Facts and figures of each reported trial and exam, of any state.
+    whole
+        Figures of all of them together; no table of them if not given.
 
     """
     left_out = '; '.join(f'{axis}: {", ".join(map(str, names))}'
@@ -242,6 +270,8 @@ def page_of(sections: Mapping[str, tuple[Json, Sequence[Json]]], sources: Sequen
                 parts += ['![rates with intervals](pictures/proof_rates.png)', '',
                           '![reliability](pictures/proof_reliability.png)', '',
                           '![confusion matrix](pictures/proof_confusion.png)', '']
+                if whole is not None:
+                    parts += _history(history, whole)
     return '\n'.join(parts)
 
 

@@ -274,6 +274,18 @@ def test_text_and_page_say_the_figures_of_each_set_apart() -> None:
     assert 'No set is reported' in page_of({'tuning': (result, [facts])}, ['a'])
 
 
+def test_the_page_lists_trials_of_all_states_with_their_sum() -> None:
+    result, both = summary.summarise(judgements()), summary.summarise(judgements() * 2)
+    facts = {'command': 'lg_husky prove', 'commit': 'c0ffee', 'cases': 6, 'planned': 6,
+             'seal': 'ab' * 32, 'seeds': '10000 to 10005', 'set': 'report'}
+    page = page_of({'report': (result, [facts])}, ['a'], history=[
+        (facts, result), ({**facts, 'set': 'exam', 'seeds': '-', 'commit': 'deadbeef'}, result)],
+        whole=both)
+    assert '| report | 10000 to 10005 | `c0ffee` | 6 | 2 of 3 |' in page
+    assert '| exam | - | `deadbeef` | 6 | 2 of 3 |' in page
+    assert '| sum |  |  | 12 | 4 of 6 |' in page
+
+
 def test_pictures_are_drawn(tmp_path: Any) -> None:
     pytest.importorskip('matplotlib')
     from lg_husky_sim.proof.pictures import draw
