@@ -54,6 +54,9 @@ def statement(one: Candidate, settings: Settings) -> str:
     parts = []
     for k, after in enumerate(estimates(one, settings)):
         before = _value(known[after.name], float(one.before[k]))
+        if after.high > after.low:
+            # To a hundredth of that interval: what is less is nothing beside it.
+            before = round(before, 2 - math.floor(math.log10(after.high - after.low)))
         parts.append(f'{known[after.name].meaning} {number(before)} → '
                      f'{with_interval(after.value, after.low, after.high, after.unit)}')
     return f'{one.change.title[0].upper()}{one.change.title[1:]}: {"; ".join(parts)}.'

@@ -174,6 +174,12 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
     """
     Return the residual and its difference quotients, by stream.
 
+    A robot whose commands act later by some time moves later by as much, and so do its streams
+    read; one whose wheels are read later has turned them earlier. So the dead time (or, at the
+    measured wheel rates, their delay) has the column of the delays of all streams, in each its
+    own. By a quotient of its own it would have nearly the same, and which of equal changes (an IMU
+    that is late, or wheels and commands that are early) is likelier would be a matter of rounding.
+
     Parameters
     ----------
     base : Base
@@ -194,16 +200,18 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
     quantities, upper = base.settings.quantities, base.bounds()[1]
     deltas = np.array([q.delta if place + q.delta <= most else -q.delta
                        for q, place, most in zip(quantities, z, upper, strict=True)])
-    near = {k: base.values(z + deltas[k] * (np.arange(z.size) == k)) for k in np.flatnonzero(free)}
-    moving = {*ROBOT, 'wheels_late' if base.given else 'dead_time'}
-    moves = [k for k in near if quantities[k].name in moving]
-    reads = [k for k in near if quantities[k].name not in moving]
+    late = {stream: base.names.index(f'{stream}_late') for stream in CHANNELS}
+    clock = base.names.index('wheels_late' if base.given else 'dead_time')
+    near = {k: base.values(z + deltas[k] * (np.arange(z.size) == k))
+            for k in sorted({*np.flatnonzero(free), *late.values()} - {clock})}
+    moves = [k for k in near if quantities[k].name in ROBOT]
+    reads = [k for k in near if quantities[k].name not in ROBOT]
     there, x = measured(base, drive), base.values(z)
     columns = {name: np.zeros((*rows.shape, z.size)) for name, rows in there.items()}
     diverged = base.settings.simulation['diverged']
     should: dict[str, FloatArray] = {}
 
-    def fill(ks: Sequence[np.intp], others: Mapping[str, FloatArray]) -> None:
+    def fill(ks: Sequence[int], others: Mapping[str, FloatArray]) -> None:
         fine = [i for i in range(len(ks)) if all(
             np.all(np.abs(rows[..., i]) < diverged) for rows in others.values())]
         for name, rows in others.items():
@@ -220,4 +228,9 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
         count = next(iter(others.values())).shape[-1]
         fill(moves[done:done + count], others)
         done += count
+    for stream, column in columns.items():
+        column[:, :, clock] = (-1.0 if base.given else 1.0) * column[:, :, late[stream]]
+        if stream == 'pose' and drive.gyro.size:
+            column[:, 2, clock] = 0.0
+        column[:, :, ~free] = 0.0
     return {name: there[name] - should[name] for name in should}, columns

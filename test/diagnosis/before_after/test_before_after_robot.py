@@ -263,6 +263,20 @@ def test_a_change_without_a_name_is_unknown() -> None:
     assert findings((by_chance,), known) == ()
 
 
+def test_an_imu_that_is_late_is_one_change_without_a_pose() -> None:
+    """And not wheel stamps that are early beside commands that act later, which reads the same."""
+    def no_pose(one: Recording) -> Recording:
+        return replace(one, streams={k: s for k, s in one.streams.items() if k != 'pose'})
+    before = [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)]
+    later = [driven('rec1', {}, 3, OTHER, late=0.12), driven('rec2', {}, 4, late=0.12)]
+    said = said_of([*map(no_pose, later)], [*map(no_pose, before)]).diagnosis
+    (finding,) = said.findings
+    assert finding.effect == 'sensor_time_offset'
+    (number,) = finding.parameters
+    assert number.name == 'imu_late'
+    assert number.value == pytest.approx(0.12, abs=0.01)
+
+
 def test_the_order_of_recordings_does_not_matter() -> None:
     """With a shifted centre of mass, whose two names are nearly the same."""
     before = [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)]
