@@ -25,13 +25,14 @@ ROBOT: Final = (
     'mass', 'yaw_inertia', 'com_x', 'com_y', 'com_height', 'radius_left', 'radius_right',
     'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak', 'reference_lag',
     'drag', 'pull', 'scrub', 'scrub_speed', 'dead_voltage', 'bus_resistance', 'droop_rate',
-    'windup', 'stiffness_ratio')
+    'windup', 'stiffness_ratio', 'encoder_left', 'encoder_right')
 #: Numbers that are not estimated.
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
                 'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate', 'least_share',
                 'scrub_rate', 'pull_speed')
 #: Columns of what is simulated: base_link's velocity, wheel rates, specific force at the centre,
-#: and what they have come to since the start: base_link's place, the angles of the wheels.
+#: and what they have come to since the start: base_link's place, the angles of the wheels. Rates
+#: and angles of the wheels are as their encoders read them.
 OUTPUTS: Final = ('forward', 'lateral', 'yaw', 'left', 'right', 'accel_x', 'accel_y',
                   'x', 'y', 'heading', 'angle_left', 'angle_right')
 #: Rows of what the integrator works on.
@@ -43,7 +44,7 @@ ROWS: Final = len(ROBOT) + 53
  _V_MAX, _I_MAX, _INERTIA, _DRY, _, _VISCOUS, _, _MU_ALONG, _MU_ACROSS, _CREEP, _SHARE, _ROLLING,
  _YAW_DAMPING, _MASS, _TURNING, _COM_X, _COM_Y, _HEIGHT, _RADIUS, _, _SLOPE_X, _SLOPE_Y, _TRACK,
  _DEFLECTION, _LEAK, _LAG, _DRAG, _PULL, _SCRUB, _SCRUB_SPEED, _DEAD, _BUS_RESISTANCE, _DROOP,
- _WINDUP, _RATIO,
+ _WINDUP, _RATIO, _ENCODER, _,
  _V, _U, _R, _WHEEL, _, _SLOW_V, _SLOW_W, _ACC_X, _ACC_Y, _HELD, _,
  _ALONG, _, _, _, _ACROSS, _, _, _,
  _A00, _A02, _A11, _A12, _A22, _B0, _B1, _B2, _FRONT, _LEFT, _GX, _GY, _BUS,
@@ -75,11 +76,12 @@ def _begin(z: FloatArray, p: FloatArray, start: FloatArray, fixed: FloatArray, s
         # An integral slower than a second is not built up yet.
         built = z[_KI, j] / (z[_KI, j] + z[_KFF, j])
         for s in range(2):
-            w = start[3 + s, j]
+            read = start[3 + s, j]
+            w = read / z[_ENCODER + s, j]
             e = (z[_DRY + s, j] * w / np.sqrt(w * w + dry_speed * dry_speed)
                  + z[_VISCOUS + s, j] * w)
             z[_WHEEL + s, j] = w
-            z[_HELD + s, j] = built * (e / (emf / resistance) + (emf - z[_KFF, j]) * w)
+            z[_HELD + s, j] = built * (e / (emf / resistance) + emf * w - z[_KFF, j] * read)
         z[_SLOW_V, j] = 0.5 * radius * (start[3, j] + start[4, j]) / z[_SPEED_GAIN, j]
         z[_SLOW_W, j] = radius * (start[4, j] - start[3, j]) / z[_TURN_WIDTH, j]
         for i in range(5, 12):
@@ -127,10 +129,11 @@ def _supply(z: FloatArray, command: FloatArray, k: int, step: float, fixed: Floa
         turn_width, slow_w, kff, kp = z[_TURN_WIDTH, j], z[_SLOW_W, j], z[_KFF, j], z[_KP, j]
         ahead, v_max = z[_SPEED_GAIN, j] * z[_SLOW_V, j], z[_V_MAX, j]
         w_left, w_right = z[_WHEEL, j], z[_WHEEL + 1, j]
+        read_left, read_right = z[_ENCODER, j] * w_left, z[_ENCODER + 1, j] * w_right
         wanted_left = (ahead + -0.5 * turn_width * slow_w) / radius
         wanted_right = (ahead + 0.5 * turn_width * slow_w) / radius
-        left = kff * wanted_left + kp * (wanted_left - w_left) + z[_HELD, j]
-        right = kff * wanted_right + kp * (wanted_right - w_right) + z[_HELD + 1, j]
+        left = kff * wanted_left + kp * (wanted_left - read_left) + z[_HELD, j]
+        right = kff * wanted_right + kp * (wanted_right - read_right) + z[_HELD + 1, j]
         left_duty = _within(left / v_max, -1.0, 1.0)
         right_duty = _within(right / v_max, -1.0, 1.0)
         weak = z[_BUS_RESISTANCE, j] / resistance
@@ -190,7 +193,7 @@ def _measured_wheel(z: FloatArray, s: int, wheels: FloatArray, k: int) -> None:
     # The forces with the wheel's rate known.
     for j in range(z.shape[1]):
         y = (0.5 if s == 0 else -0.5) * z[_TRACK, j] - z[_COM_Y, j]
-        push = z[_A + s, j] * z[_RADIUS + s, j] * wheels[k + 1, s, j]
+        push = z[_A + s, j] * z[_RADIUS + s, j] * wheels[k + 1, s, j] / z[_ENCODER + s, j]
         z[_B0, j] += push
         z[_B2, j] -= push * y
 
@@ -204,6 +207,7 @@ def _driven_wheel(z: FloatArray, s: int, step: float, fixed: FloatArray) -> None
         w, wanted, volts, bus = z[_WHEEL + s, j], z[_WANTED + s, j], z[_VOLTS + s, j], z[_BUS, j]
         radius, a, dead, i_max = z[_RADIUS + s, j], z[_A + s, j], z[_DEAD, j], z[_I_MAX, j]
         kp, held, inertia = z[_KP, j], z[_HELD + s, j], z[_INERTIA, j]
+        encoder = z[_ENCODER + s, j]
         loss = z[_VISCOUS + s, j] + z[_DRY + s, j] / np.sqrt(w * w + dry_speed * dry_speed)
         clipped = _within(volts, -z[_V_MAX, j], z[_V_MAX, j])
         lost = _within(clipped, -dead, dead)
@@ -212,7 +216,7 @@ def _driven_wheel(z: FloatArray, s: int, step: float, fixed: FloatArray) -> None
         # The torque, and its slope by the wheel's rate, are implicit.
         slope = inertia / step + loss + radius * radius * a
         carried = slope + volt_per_amp * emf
-        regulated = carried + volt_per_amp * bus * kp
+        regulated = carried + volt_per_amp * bus * kp * encoder
         d = slope if limited else (regulated if free else carried)
         most = emf * (i_max if amps > 0.0 else -i_max)
         asked = volt_per_amp * bus * ((z[_KFF, j] + kp) * wanted + held - lost)
@@ -222,8 +226,8 @@ def _driven_wheel(z: FloatArray, s: int, step: float, fixed: FloatArray) -> None
         # A loop does not integrate further into a limit of the voltage; of one of the current, it
         # may not know.
         share = z[_WINDUP, j] if limited else 1.0
-        grown = held + share * z[_KI, j] * (wanted - w) * step
-        held = grown if free or volts * (wanted - w) < 0.0 else held
+        grown = held + share * z[_KI, j] * (wanted - encoder * w) * step
+        held = grown if free or volts * (wanted - encoder * w) < 0.0 else held
         faded = held * z[_KEPT, j]
         z[_HELD + s, j] = faded if abs(wanted) < rest_rate else held
         # Wheel eliminated: w' = (nw + R a (v' - r' y)) / d.
@@ -273,7 +277,7 @@ def _turned(z: FloatArray, s: int) -> None:
 @jit_part
 def _followed(z: FloatArray, s: int, wheels: FloatArray, k: int) -> None:
     for j in range(z.shape[1]):
-        z[_WHEEL + s, j] = wheels[k + 1, s, j]
+        z[_WHEEL + s, j] = wheels[k + 1, s, j] / z[_ENCODER + s, j]
 
 
 @jit_part
@@ -296,8 +300,8 @@ def _speeds(z: FloatArray, out: FloatArray, k: int) -> None:
         out[k, 0, j] = z[_V, j] + z[_R, j] * z[_COM_Y, j]
         out[k, 1, j] = z[_U, j] - z[_R, j] * z[_COM_X, j]
         out[k, 2, j] = z[_R, j]
-        out[k, 3, j] = z[_WHEEL, j]
-        out[k, 4, j] = z[_WHEEL + 1, j]
+        out[k, 3, j] = z[_ENCODER, j] * z[_WHEEL, j]
+        out[k, 4, j] = z[_ENCODER + 1, j] * z[_WHEEL + 1, j]
 
 
 @jit_part

@@ -87,8 +87,8 @@ def started(nominal: ModelFile, base: Mapping[str, float], settings: Settings) -
 def having(model: ModelFile, changed: Mapping[str, float], settings: Settings) -> ModelFile:
     """Return a model with what the robot did not have before, by parameters of the base."""
     brought = {name: settings.runs_as[name] for name in changed if name in settings.runs_as}
-    return _with(model, [Effect(effect) for effect, _ in brought.values()],
-                 {number: changed[name] for name, (_, number) in brought.items()})
+    return _with(model, [Effect(effect, side) for effect, _, side in brought.values()],
+                 {number: changed[name] for name, (_, number, _) in brought.items()})
 
 
 def _with(model: ModelFile, effects: Sequence[Effect], values: Mapping[str, float]) -> ModelFile:

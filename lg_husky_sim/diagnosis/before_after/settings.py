@@ -107,8 +107,8 @@ class Settings:
     simulation : mapping of str to float
     bins, noise : mapping of str to float
         Of each kind of channel: width of a bin [s], residual to begin with [unit].
-    runs_as : mapping of str to (str, str)
-        Effect and its number by which a model has a parameter of the base that changed.
+    runs_as : mapping of str to (str, str, str)
+        Effect, its number and its side by which a model has a parameter of the base that changed.
     not_told : mapping of str to str
         Effects of the catalogue of which a change is not told, and why.
     """
@@ -127,7 +127,7 @@ class Settings:
     decision: Mapping[str, float]
     changes: tuple[Change, ...]
     aliases: Mapping[str, tuple[str, ...]]
-    runs_as: Mapping[str, tuple[str, str]]
+    runs_as: Mapping[str, tuple[str, str, str]]
     not_told: Mapping[str, str]
     separations: tuple[Separation, ...]
     advice: Mapping[str, tuple[str, ...]]
@@ -216,8 +216,8 @@ def settings() -> Settings:
                         _values(content, 'decision'),
                         tuple(_change(entry, known) for entry in content['changes']),
                         {name: tuple(others) for name, others in content['aliases'].items()},
-                        {name: (str(effect), str(number))
-                         for name, (effect, number) in content['runs_as'].items()},
+                        {name: (str(effect), str(number), str(side))
+                         for name, (effect, number, side) in content['runs_as'].items()},
                         {name: str(why) for name, why in content['not_told'].items()},
                         tuple(Separation(frozenset(e['effects']), tuple(e['sensors']),
                                          tuple(e['drives'])) for e in content['separations']),

@@ -171,7 +171,8 @@ def test_a_change_is_named_with_its_number(changes: Mapping[str, float], effect:
 @pytest.mark.parametrize(('changes', 'effect', 'side'), [
     ({'drag': 60.0}, 'quadratic_drag', 'both'), ({'pull': -4.0}, 'yaw_pull', 'right'),
     ({'dead_voltage': 1.5}, 'driver_deadband', 'both'),
-    ({'bus_resistance': 0.4}, 'battery_sag', 'both')])
+    ({'bus_resistance': 0.4}, 'battery_sag', 'both'),
+    ({'encoder_right': 1.04}, 'encoder_scale', 'right')])
 def test_so_is_one_of_what_the_robot_did_not_have_before(changes: Mapping[str, float], effect: str,
                                                          side: str) -> None:
     said = changed(changes, 7).diagnosis
@@ -179,7 +180,7 @@ def test_so_is_one_of_what_the_robot_did_not_have_before(changes: Mapping[str, f
     assert (finding.effect, finding.side) == (effect, side)
     (number,), (value,) = finding.parameters, changes.values()
     assert number.value == pytest.approx(value, rel=0.3)
-    (_, own), = (one for name, one in settings().runs_as.items() if name == number.name)
+    (_, own, _), = (one for name, one in settings().runs_as.items() if name == number.name)
     assert said.model.parameters[own] == pytest.approx(number.value)
     assert own not in said.plain_model.parameters
 
