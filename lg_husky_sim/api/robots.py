@@ -97,7 +97,7 @@ class Husky(Graph):
         side, shape : str
             Where it has several; the first by default.
         **values : float
-            Its numbers [SI]; typical sizes by default.
+            Its numbers [SI]; by default sizes that are typical of such a robot.
 
         Returns
         -------
@@ -109,10 +109,10 @@ class Husky(Graph):
             If the effect, its side or shape, or a number is unknown or out of bounds.
         """
         added = Effect(effect, side, shape)
-        structure = self.model.structure.with_effect(added)
+        structure = self.model.in_proportion().structure.with_effect(added)
         check_distinct(structure.effects)
         parameters = self.model.parameters.with_entries(*(
-            one.parameter() for one in added.parameters()
+            one.parameter() for one in structure.effects[-1].parameters()
             if one.name not in self.model.parameters))
         return Husky(ModelFile(structure, parameters.replacing(values), self.model.about))
 

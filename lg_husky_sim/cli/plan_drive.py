@@ -78,7 +78,7 @@ def _from_ids(text: str, robot: Path | None) -> tuple[Rival, Rival]:
     if len(names) != 2 or not all(names) or names[0] == names[1]:
         raise SettingsError(f'--effects {text!r}: expected two different ids, such as '
                             'yaw_scrub_coulomb,terrain_change')
-    model = load_model(robot)
+    model = load_model(robot).in_proportion()
     one, two = (typical(name, model.structure, model.parameters, side)
                 for name, _, side in (part.partition(':') for part in names))
     return one, two
@@ -104,7 +104,8 @@ def _from_folder(folder: Path) -> tuple[Rival, Rival]:
     if not finding or name == 'unknown' or not rivals:
         raise SettingsError(
             f'{place} names no effect with a competing one, so there is nothing to distinguish')
-    plain, model = load_model(folder / 'plain.yaml'), load_model(folder / 'model.yaml')
+    plain, model = (load_model(folder / name).in_proportion()
+                    for name in ('plain.yaml', 'model.yaml'))
     first = next((e for e in model.structure.effects
                   if e.id == name and e not in plain.structure.effects), None)
     if first is None:

@@ -80,7 +80,8 @@ def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
     CommercialBase or None
         None where nothing is long enough, or not driven.
     """
-    known = settings()
+    nominal = nominal.in_proportion()
+    known = settings().of(nominal.structure.robot)
     parts = _shortened(parts)
     cut = [replace(r, streams={name: series.slice(p.start, p.end)
                                for name, series in r.streams.items()})

@@ -29,6 +29,7 @@ from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import descriptions, Effect
 from lg_husky_sim.husky.network import on_side
 from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.husky.robot_size import RobotSize
 import numpy as np
 
 #: Parameter whose sign says to which side an effect acts: positive to the left.
@@ -222,7 +223,7 @@ def remaining(search: Search) -> Search:
     return replace(search, evidence=evidence, final=final)
 
 
-def felt(rest: Sequence[Effort], free: Sequence[Missing]
+def felt(rest: Sequence[Effort], free: Sequence[Missing], robot: RobotSize
          ) -> tuple[tuple[Effort, ...], tuple[Missing, ...]]:
     """
     Return the efforts that are not negligible.
@@ -232,6 +233,7 @@ def felt(rest: Sequence[Effort], free: Sequence[Missing]
     rest : sequence of Effort
     free : sequence of Missing
         Of all drives.
+    robot : RobotSize
 
     Returns
     -------
@@ -239,7 +241,8 @@ def felt(rest: Sequence[Effort], free: Sequence[Missing]
     tuple of Missing
         Those that somewhere reach the size from which their description in effects.yaml counts.
     """
-    least = {balance: next(p.negligible for p in descriptions()[name].parameters if p.negligible)
+    least = {balance: next(p.of(robot).negligible for p in descriptions()[name].parameters
+                           if p.negligible)
              for balance, (_, name, *_) in BALANCES.items()}
     largest = dict.fromkeys(BALANCES, 0.0)
     for one in free:
@@ -274,7 +277,7 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     Answer
     """
     needed = needed_evidence(rest, free)
-    rest, free = felt(rest, free)
+    rest, free = felt(rest, free, search.final.point.structure.robot)
     is_left = max([0.0, *(e.evidence for e in rest), *(m.bursts for m in free)]) > needed
     explained = max([0.0, *(e.explained for e in rest), *(m.bursts for m in free)])
     first = search.rounds[0]
@@ -341,7 +344,7 @@ def explained_by(search: Search) -> float:
 
 def unknown_finding(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> Finding:
     """Return what is missing without a name, by its best description."""
-    rest, free = felt(rest, free)
+    rest, free = felt(rest, free, search.final.point.structure.robot)
     smooth = max(rest, key=lambda one: one.evidence, default=None)
     bursts = max(free, key=lambda one: one.bursts, default=None)
     if smooth is not None and (bursts is None or smooth.evidence >= bursts.bursts):

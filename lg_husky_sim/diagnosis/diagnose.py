@@ -101,6 +101,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     RecordingError
         If any recording cannot be used, or one is given twice.
     """
+    nominal = nominal.in_proportion()
     recordings, _ = named_apart(recordings, ())
     drives = drives_of(recordings)
     names = [r.name for r in recordings]
@@ -113,7 +114,8 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         start = beginning(nominal.structure, base_unknowns(numbers, drives), numbers, Reading())
         start, there = begun_with(start, certain(seen))
         progress('noise', 0.02)
-        evidence = evidence_of(drives, names, start, first_guess(drives), pool)
+        evidence = evidence_of(drives, names, start,
+                               first_guess(drives, start.structure.robot), pool)
         if different:
             progress('recalibration', 0.05)
         found = unsearched(evidence, start) if different else search(evidence, start, progress)

@@ -18,7 +18,7 @@ from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drive_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import NAMES as LEVELS
-from lg_husky_sim.diagnosis.evidence.noise import Noise
+from lg_husky_sim.diagnosis.evidence.noise import Noise, UNITS
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, effect_unknowns
@@ -102,7 +102,7 @@ def typical(name: str, structure: Structure, parameters: Parameters, side: str =
                   and not e.again), None)
     if there is not None:
         return _changed(there, structure, parameters)
-    bare = Effect(name, side)
+    bare = Effect(name, side, robot=structure.robot)
     effect = replace(bare, late=False)
     free = [p for p in effect.parameters() if not p.fixed]
     count = max(len(p.starts) for p in free)
@@ -238,7 +238,8 @@ def imitated(truth: Rival, other: Rival, manoeuvre: Manoeuvre) -> tuple[float, s
         If the other one cannot be simulated.
     """
     drive = recorded(truth, manoeuvre)
-    noise = Noise({name: setting(f'planned_{name}') for name in LEVELS})
+    noise = Noise({name: other.structure.robot.factor(UNITS.get(name, '1')) * setting(
+        f'planned_{name}') for name in LEVELS})
     base = base_unknowns(other.parameters, [drive])
     best = None
     with Threads(1) as pool:

@@ -14,6 +14,7 @@ from typing import Any
 
 from lg_husky_sim.errors import ModelFileError, ParameterError
 from lg_husky_sim.husky.parameters import Parameter
+from lg_husky_sim.husky.robot_size import HUSKY, RobotSize
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.yaml_files import read_yaml, shown
 
@@ -123,6 +124,14 @@ class EffectParameter:
     jitter: Mapping[str, str] = field(default_factory=dict)
     delays: Mapping[str, str] = field(default_factory=dict)
 
+    def of(self, robot: RobotSize) -> EffectParameter:
+        """Return it for a robot of another size: bounds and sizes are in proportion."""
+        factor = robot.factor(self.unit)
+        return self if factor == 1.0 else replace(
+            self, lower=factor * self.lower, upper=factor * self.upper,
+            starts=tuple(factor * start for start in self.starts),
+            negligible=factor * self.negligible, none_from=factor * self.none_from)
+
     def parameter(self, value: float | None = None) -> Parameter:
         """Return it as a parameter with ``value``, or with its first start."""
         return Parameter(self.name, self.starts[0] if value is None else value, self.unit,
@@ -230,6 +239,8 @@ class Effect:
     again : bool
         Whether it takes the place of the same effect of the same side, with numbers of its own:
         what was there already and changes at the onset.
+    robot : RobotSize
+        Of the robot that may have it: its numbers are in proportion.
 
     Raises
     ------
@@ -242,6 +253,7 @@ class Effect:
     shape: str = ''
     late: bool = False
     again: bool = False
+    robot: RobotSize = field(default=HUSKY, compare=False)
 
     def __post_init__(self) -> None:
         """Fill defaults and check against the catalogue."""
@@ -269,7 +281,7 @@ class Effect:
 
     def parameters(self) -> tuple[EffectParameter, ...]:
         """Return the numbers that this side and shape have."""
-        own = tuple(p for p in self.kind.parameters
+        own = tuple(p.of(self.robot) for p in self.kind.parameters
                     if not p.shapes or self.shape in p.shapes)
         return tuple(replace(p, name=p.name + LATER) for p in own) if self.again else own
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import enum
 from functools import lru_cache
 
@@ -18,6 +18,7 @@ from lg_husky_sim.husky.effects import always_on, Effect, Onset
 from lg_husky_sim.husky.laws import MOTOR, WIDTH
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import CommandStage, Plant, PlantSet, SensorModel
+from lg_husky_sim.husky.robot_size import HUSKY, RobotSize
 from lg_husky_sim.husky.speed_loop import close_speed_loop
 from lg_husky_sim.husky.speed_loop import STATES as LOOP_STATES
 from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, NumericModel, StateSpace
@@ -44,6 +45,8 @@ class Structure:
         Applied in this order.
     onset : Onset or None
         When or where the late ones among the effects begin.
+    robot : RobotSize
+        Of the robot: what is typical of effects that it may get is in proportion.
 
     Raises
     ------
@@ -54,6 +57,7 @@ class Structure:
     drivetrain: Drivetrain = Drivetrain.SIMPLIFIED
     effects: tuple[Effect, ...] = ()
     onset: Onset | None = None
+    robot: RobotSize = field(default=HUSKY, compare=False)
 
     def __post_init__(self) -> None:
         """Check the effects against the onset."""
@@ -71,7 +75,8 @@ class Structure:
         drivetrain = self.drivetrain
         if effect.kind.drivetrain:
             drivetrain = Drivetrain(effect.kind.drivetrain)
-        return Structure(drivetrain, (*self.effects, effect), onset or self.onset)
+        added = replace(effect, robot=self.robot)
+        return Structure(drivetrain, (*self.effects, added), onset or self.onset, self.robot)
 
     def network(self, late: bool = True) -> EditedNetwork:
         """

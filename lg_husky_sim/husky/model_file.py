@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 import os
 from pathlib import Path
@@ -17,6 +17,7 @@ from lg_husky_sim.husky.effects import check_distinct, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import Drivetrain, Structure
 from lg_husky_sim.husky.model_schema import EFFECT, ONSET, PARAMETER, SCHEMA, STRUCTURE, TOP
 from lg_husky_sim.husky.parameters import Parameter, Parameters
+from lg_husky_sim.husky.robot_size import size_of
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.yaml_files import read_yaml, shown, yaml_text
 
@@ -41,6 +42,12 @@ class ModelFile:
     structure: Structure
     parameters: Parameters
     about: str = ''
+
+    def in_proportion(self) -> ModelFile:
+        """Return this model with effects that it may get in proportion to its robot."""
+        robot = size_of(self.parameters, load_model(default_model_path()).parameters)
+        effects = tuple(replace(effect, robot=robot) for effect in self.structure.effects)
+        return replace(self, structure=replace(self.structure, effects=effects, robot=robot))
 
 
 def default_model_path() -> Path:

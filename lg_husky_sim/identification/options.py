@@ -48,13 +48,14 @@ def with_effects(model: ModelFile, texts: Sequence[str]) -> ModelFile:
     ParameterError
         If one is unknown or does not fit, or two share a parameter.
     """
-    structure, parameters = model.structure, model.parameters
+    structure, parameters = model.in_proportion().structure, model.parameters
     for name in names_in(texts):
         effect = effect_in(name)
         if effect in structure.effects:
             continue
         structure = structure.with_effect(effect)
         parameters = parameters.with_entries(*(
-            p.parameter() for p in effect.parameters() if p.name not in parameters))
+            p.parameter() for p in structure.effects[-1].parameters()
+            if p.name not in parameters))
     check_distinct(structure.effects)
     return ModelFile(structure, parameters, model.about)

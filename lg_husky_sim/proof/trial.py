@@ -157,6 +157,8 @@ def command_for(folders: Folders, name: str, out: Path, told: Mapping[str, Any])
     """
     Return the command line that diagnoses one case; it names recordings and two lengths.
 
+    A case may have a model of its robot, `robot.yaml`.
+
     Parameters
     ----------
     folders, name
@@ -174,6 +176,8 @@ def command_for(folders: Folders, name: str, out: Path, told: Mapping[str, Any])
                '--out', str(out), '--seed', '1', '--jobs', '1', '--no-report',
                '--set', f'wheel_radius={told["wheel_radius_m"]}',
                '--set', f'track={told["track_m"]}']
+    if (model := case / 'robot.yaml').is_file():
+        command += ['--robot', str(model)]
     for path in before:
         command += ['--baseline', str(path)]
     return command

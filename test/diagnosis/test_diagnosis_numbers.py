@@ -51,7 +51,7 @@ def test_every_number_has_a_value_a_unit_and_a_meaning(name: str) -> None:
 @pytest.mark.parametrize('name', ENTRIES)
 def test_every_number_is_used_somewhere(name: str) -> None:
     prefix, _, rest = name.partition('_')
-    by_noise = f"setting(f'{prefix}_{{" in CODE and rest in NAMES
+    by_noise = re.search(rf"setting\(\s*f'{prefix}_{{", CODE) and rest in NAMES
     assert re.search(rf"'{name}'", CODE) or by_noise
 
 

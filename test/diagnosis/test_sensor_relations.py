@@ -223,7 +223,8 @@ def test_a_fit_with_numbers_that_no_such_robot_has_is_of_another_robot(
     residuals = np.array([np.log(numbers[entry.name] / entry.value) / entry.tolerance]
                          + [0.0] * (len(unknowns) - 1))
     fit: Any = SimpleNamespace(point=SimpleNamespace(
-        unknowns=unknowns, prior_residuals=residuals, numbers=numbers))
+        unknowns=unknowns, prior_residuals=residuals, numbers=numbers,
+        structure=model.structure.with_effect(payload)))
     assert bool(impossible(fit, model.parameters)) is impossible_
 
 

@@ -93,7 +93,8 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
                 nominal: ModelFile, progress: Progress, *, jobs: int = 1) -> ChangeCase:
     """Do as :func:`diagnose_change`, and return what the answer was made from as well."""
     recordings, baseline = named_apart(recordings, baseline)
-    known = settings()
+    nominal = nominal.in_proportion()
+    known = settings().of(nominal.structure.robot)
     before, after = _drives(baseline, known), _drives(recordings, known)
     later = frozenset(drive.recording for drive in after)
     moved = None

@@ -99,7 +99,7 @@ def _with(model: ModelFile, effects: Sequence[Effect], values: Mapping[str, floa
         if any(there.id == effect.id for there in structure.effects):
             continue
         structure = structure.with_effect(effect)
-        entries.extend(p.parameter() for p in effect.parameters())
+        entries.extend(p.parameter() for p in structure.effects[-1].parameters())
     known = parameters.with_entries(*entries)
     inside = {name: float(np.clip(value, known.entry(name).lower, known.entry(name).upper))
               for name, value in values.items() if name in known}

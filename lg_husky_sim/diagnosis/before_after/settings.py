@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT
 from lg_husky_sim.errors import DiagnosisError
+from lg_husky_sim.husky.robot_size import RobotSize
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.yaml_files import read_yaml, shown
 
@@ -49,6 +50,15 @@ class Quantity:
     delta: float
     lower: float
     upper: float
+
+    def of(self, robot: RobotSize) -> Quantity:
+        """Return it for a robot of another size."""
+        factor = robot.factor(self.unit)
+        steps = 1.0 if self.logarithmic else factor
+        return self if factor == 1.0 else replace(
+            self, start=None if self.start is None else factor * self.start,
+            sd=steps * self.sd, recording=steps * self.recording, change=steps * self.change,
+            delta=steps * self.delta, lower=factor * self.lower, upper=factor * self.upper)
 
 
 @dataclass(frozen=True)
@@ -137,6 +147,20 @@ class Settings:
     def quantities(self) -> tuple[Quantity, ...]:
         """All that is estimated, in order."""
         return (*self.robot, *self.record)
+
+    def of(self, robot: RobotSize) -> Settings:
+        """Return them for a robot of another size."""
+        known = {q.name: q for q in self.quantities}
+
+        def values(entry: Mapping[str, float], added: bool) -> dict[str, float]:
+            return {name: value if added and known[name].logarithmic else
+                    robot.factor(known[name].unit) * value for name, value in entry.items()}
+        return replace(
+            self, robot=tuple(q.of(robot) for q in self.robot),
+            record=tuple(q.of(robot) for q in self.record),
+            starts=tuple(values(entry, True) for entry in self.starts),
+            kinds=tuple(values(entry, False) for entry in self.kinds),
+            fit={**self.fit, 'current_shows': robot.factor('A') * self.fit['current_shows']})
 
 
 def _number(where: str, value: object) -> float:

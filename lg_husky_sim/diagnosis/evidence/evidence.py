@@ -251,7 +251,7 @@ class Evidence:
         models = self.deviations(fit.point)
         residuals = [d.measured - p for d, p in zip(drives, predicted, strict=True)]
         noise = fit_noise(self.noise, frames, models, residuals, self.pool, rounds,
-                          setting(longest))
+                          setting(longest), fit.point.structure.robot)
         whiteners = [whitener_of(f, m, noise) for f, m in zip(frames, models, strict=True)]
         return Evidence(drives, self.names, noise, whiteners, self.pool)
 

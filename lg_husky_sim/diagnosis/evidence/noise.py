@@ -27,6 +27,7 @@ from lg_husky_sim.diagnosis.evidence.whitener import (
     whiten_switched,
 )
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.robot_size import HUSKY, RobotSize
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -34,6 +35,8 @@ import numpy as np
 NAMES = ('force', 'moment', 'drive', 'force_time', 'moment_time', 'drive_time', 'place_walk',
          'heading_walk', 'wheel', 'wheel_jitter', 'gyro', 'imu_jitter', 'place', 'heading',
          'pose_jitter', 'command_jitter')
+#: Units of those that are larger for a larger robot.
+UNITS = {'force': 'N', 'moment': 'N·m', 'drive': 'N·m'}
 
 
 @dataclass(frozen=True)
@@ -186,7 +189,11 @@ def negative_log_likelihood(whitened: FloatArray, scale: FloatArray) -> float:
                  + np.sum(np.log(scale)))
 
 
-def first_guess(drives: Sequence[Drive]) -> Noise:
+def _first(name: str, robot: RobotSize) -> float:
+    return robot.factor(UNITS.get(name, '1')) * setting(f'first_{name}')
+
+
+def first_guess(drives: Sequence[Drive], robot: RobotSize = HUSKY) -> Noise:
     """Return where the search for the intensities begins: sensors from their differences."""
     def level(*channels: Channel) -> float:
         found = []
@@ -199,7 +206,7 @@ def first_guess(drives: Sequence[Drive]) -> Noise:
         return max(float(np.median(found)) if found else 0.0, 1e-4)
     wheels = level(Channel.WHEEL_LEFT, Channel.WHEEL_RIGHT, Channel.ANGLE_LEFT,
                    Channel.ANGLE_RIGHT)
-    values = {name: setting(f'first_{name}') for name in NAMES
+    values = {name: _first(name, robot) for name in NAMES
               if name not in ('wheel', 'gyro', 'place', 'heading')}
     values |= {'wheel': 1.5 * wheels, 'gyro': 1.5 * level(Channel.YAW_RATE),
                'place': 1.5 * level(Channel.X, Channel.Y), 'heading': 1.5 * level(
@@ -207,8 +214,9 @@ def first_guess(drives: Sequence[Drive]) -> Noise:
     return Noise(values)
 
 
-def _bounds(longest: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    centre = np.array([math.log(setting(f'first_{n}')) if n not in (
+def _bounds(longest: float, robot: RobotSize
+            ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    centre = np.array([math.log(_first(n, robot)) if n not in (
         'wheel', 'gyro', 'place', 'heading') else 0.0 for n in NAMES])
     spread = np.array([setting('time_spread') if n.endswith('_time') else setting('noise_spread')
                        if n not in ('wheel', 'gyro', 'place', 'heading') else 50.0
@@ -221,8 +229,8 @@ def _bounds(longest: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatAr
 
 
 def fit_noise(start: Noise, frames: Sequence[Frame], models: Sequence[FloatArray],
-              residuals: Sequence[FloatArray], pool: Executor, rounds: int, longest: float
-              ) -> Noise:
+              residuals: Sequence[FloatArray], pool: Executor, rounds: int, longest: float,
+              robot: RobotSize = HUSKY) -> Noise:
     """
     Find the intensities of all noise by maximum likelihood (Fisher scoring).
 
@@ -237,12 +245,14 @@ def fit_noise(start: Noise, frames: Sequence[Frame], models: Sequence[FloatArray
         Largest number of scoring steps.
     longest : float
         Longest time constant of a disturbance [s].
+    robot : RobotSize
+        Of which the disturbances are.
 
     Returns
     -------
     Noise
     """
-    centre, spread, lower, upper = _bounds(longest)
+    centre, spread, lower, upper = _bounds(longest, robot)
     step = 0.05
 
     def run(place: FloatArray) -> tuple[float, FloatArray, FloatArray]:

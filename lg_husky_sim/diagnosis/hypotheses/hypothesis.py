@@ -164,7 +164,7 @@ def hypotheses(structure: Structure) -> tuple[Hypothesis, ...]:
     for name, kind in ((name, kind) for name, kind in catalogue().items() if kind.tried):
         later = {shape for others in kind.stands_for.values() for shape in others}
         for side, shape in itertools.product(kind.sides, kind.shapes):
-            effect = Effect(name, side, shape)
+            effect = Effect(name, side, shape, robot=structure.robot)
             if not taken & {p.name for p in effect.parameters()} and shape not in later:
                 found.append(_of(effect))
     return tuple(found)

@@ -95,7 +95,8 @@ def impossible(fit: Fit, parameters: Parameters) -> tuple[Difference, ...]:
     tuple of Difference
         One for all of them, or none.
     """
-    most, load = setting('impossible'), setting('largest_load')
+    most = setting('impossible')
+    load = fit.point.structure.robot.factor('kg') * setting('largest_load')
     numbers = fit.point.numbers
     said, certainty = [], 0.0
     for unknown, residual in zip(fit.point.unknowns, fit.point.prior_residuals, strict=True):
