@@ -45,6 +45,19 @@ def test_each_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.Monke
         ('coulomb_drivetrain', 'left')]
 
 
+def test_the_example_of_another_robot_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+                                            ) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / 'docs' / 'other_robots.md').read_text(encoding='utf-8')
+    names: dict[str, Any] = {}
+    for block in re.findall(r'```python\n(.*?)```', text, re.DOTALL):
+        exec(compile(block, 'docs/other_robots.md', 'exec'), names)
+    (finding,) = names['found'].findings
+    assert finding.effect == 'coulomb_drivetrain'
+    torque = next(one for one in finding.parameters if one.name == 'dry_torque')
+    assert torque.low < 0.6 < torque.high
+
+
 def test_the_page_says_what_is_public_and_nothing_else() -> None:
     text = (ROOT / 'docs' / 'python.md').read_text(encoding='utf-8')
     said = set(re.findall(r'\blg\.(\w+)', text))
