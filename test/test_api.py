@@ -45,8 +45,8 @@ def test_each_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.Monke
         ('coulomb_drivetrain', 'left')]
 
 
-def test_the_example_of_another_robot_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-                                            ) -> None:
+def test_the_example_of_another_robot_runs(tmp_path: Path,
+                                           monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = (ROOT / 'docs' / 'other_robots.md').read_text(encoding='utf-8')
     names: dict[str, Any] = {}
