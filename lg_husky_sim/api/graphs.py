@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from lg_husky_sim.api.tables import page_part, Table
-from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.errors import LgHuskyError, ParameterError
 from lg_husky_sim.linear_graph import (
     compile_numeric,
     derive,
+    equation_forms,
     LinearGraph,
     StateSpace,
     SymbolicStateSpace,
@@ -26,8 +27,10 @@ class Graph:
     """
     A linear graph and the state-space model that follows from it.
 
-    dx/dt = A x + B u, y = C x + D u (and E, F, G, … where inputs are differentiated or laws are
-    not linear, see :class:`~lg_husky_sim.linear_graph.StateSpace`).
+    dx/dt = A x + B u + E du/dt + G f(z), y = C x + D u + F du/dt + L_c f(z), z = H x + K u + N f.
+    E and F are zero unless an excess storage hangs on an input, G and what follows unless laws
+    are not linear; ``repr(graph)`` says which there are. ``standard_form()`` of
+    :attr:`symbolic` and of :meth:`numeric` makes E zero: the states become x - E u.
 
     Parameters
     ----------
@@ -73,6 +76,21 @@ class Graph:
     def D(self) -> Any:
         """Feed-through in symbols, a ``sympy.Matrix`` of shape (p, m)."""
         return self.symbolic.D
+
+    @property
+    def E(self) -> Any:
+        """State equations' matrix of du/dt in symbols, a ``sympy.Matrix`` of shape (n, m)."""
+        return self.symbolic.E
+
+    @property
+    def F(self) -> Any:
+        """Outputs' matrix of du/dt in symbols, a ``sympy.Matrix`` of shape (p, m)."""
+        return self.symbolic.F
+
+    @property
+    def G(self) -> Any:
+        """State equations' matrix of the efforts f(z), a ``sympy.Matrix`` of shape (n, k)."""
+        return self.symbolic.G
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -203,8 +221,14 @@ class Graph:
         return derive(self.graph, self.outputs) if by_parameter else self.symbolic
 
     def __repr__(self) -> str:
-        """Name the graph and its sizes."""
-        return f'<{type(self).__name__} {self.name}: {len(self.graph.branches)} branches>'
+        """Name the graph, its size and the equations that it has."""
+        try:
+            model = compile_numeric(self.graph, self.outputs, chained=True).generic()
+            forms = [''] + list(equation_forms(model))
+        except LgHuskyError:        # one that cannot be derived has a name all the same
+            forms = []
+        return (f'<{type(self).__name__} {self.name}: {len(self.graph.branches)} branches'
+                f'{"; ".join(forms)}>')
 
     def _repr_latex_(self) -> str:
         from lg_husky_sim.linear_graph.report import state_equation_latex

@@ -14,7 +14,7 @@ from lg_husky_sim.linear_graph.elements import (
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.normal_tree import normal_tree, NormalTree
 from lg_husky_sim.linear_graph.numeric import compile_numeric, NumericModel
-from lg_husky_sim.linear_graph.state_space import StateSpace
+from lg_husky_sim.linear_graph.state_space import equation_forms, StateSpace
 from lg_husky_sim.linear_graph.symbolic import derive, SymbolicStateSpace
 
 __all__ = [
@@ -32,5 +32,6 @@ __all__ = [
     'compile_numeric',
     'default_form',
     'derive',
+    'equation_forms',
     'normal_tree',
 ]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from lg_husky_sim.errors import GraphError
 from lg_husky_sim.linear_graph.elements import Branch, Domain, Kind, SOURCES, TwoPort
+from lg_husky_sim.linear_graph.expressions import names_in
 
 if TYPE_CHECKING:
     from lg_husky_sim.linear_graph.graph import Edge, LinearGraph, Node
@@ -47,24 +48,35 @@ def check_complete(graph: LinearGraph) -> None:
 
 def check_symbols(graph: LinearGraph) -> None:
     """
-    Check that an element's name and the parameters of laws can stand in one equation.
+    Check that elements, parameters and inputs can stand in one equation: a name means one thing.
 
     Raises
     ------
     GraphError
-        If a law has a parameter with the name of an element whose value is another one.
+        If a parameter has the name of an element whose value is another one, or a source's input
+        the name of an element's value or of a parameter.
     """
     elements: list[Branch | TwoPort] = [*graph.branches, *graph.two_ports]
     values = {e.name: e.value for e in elements if e.characteristic is None
               and not (isinstance(e, Branch) and e.kind in SOURCES)}
+    owners: dict[str, str] = {}
     for element in elements:
-        if element.characteristic is None:
+        law = element.characteristic
+        if law is None and element.name not in values:
             continue
-        for name in element.characteristic.parameters:
+        for name in names_in(element.value) if law is None else law.parameters:
+            owner = f'of {"" if law is None else "the law of "}{element.name!r}'
+            owners.setdefault(name, owner)
             if values.get(name, name) != name:
                 raise GraphError(
-                    f'parameter {name!r} of the law of {element.name!r} has the name of element '
+                    f'parameter {name!r} {owner} has the name of element '
                     f'{name!r}, whose value is {values[name]!r}; give one of them another name')
+    for source in graph.of_kind(*SOURCES):
+        name = source.input_name
+        if source.characteristic is None and (name in values or name in owners):
+            other = f'parameter {owners[name]}' if name in owners else 'value of an element'
+            raise GraphError(f'the input {name!r} of source {source.name!r} has the name of the '
+                             f'{other}; give one of them another name')
 
 
 def _check_names(graph: LinearGraph) -> None:

@@ -14,7 +14,12 @@ from dataclasses import dataclass
 from enum import Enum
 
 from lg_husky_sim.errors import GraphError
-from lg_husky_sim.linear_graph.expressions import is_name, linear_coefficients, names_in, parse
+from lg_husky_sim.linear_graph.expressions import (
+    linear_coefficients,
+    names_in,
+    parse,
+    why_no_name,
+)
 from lg_husky_sim.linear_graph.laws import expression_of
 
 
@@ -129,8 +134,8 @@ class Characteristic:
         object.__setattr__(self, 'of', tuple(self.of))
         object.__setattr__(self, 'parameters', tuple(self.parameters))
         for name in self.parameters:
-            if not is_name(name):
-                raise GraphError(f'law {self.law!r}: {name!r} is not a parameter name')
+            if why := why_no_name(name):
+                raise GraphError(f'law {self.law!r}: parameter name {name!r} {why}')
         unknown = set(names_in(self.expression)) - set(self.parameters) - set(self.arguments)
         if unknown:
             raise GraphError(
@@ -230,8 +235,11 @@ class Branch:
                                  'characteristic; give one of them')
             return
         if self.kind in SOURCES:
-            if self.value and not is_name(self.value):
-                raise GraphError(f'source {self.name!r}: input {self.value!r} is not a plain name')
+            if self.value and (why := why_no_name(self.value)):
+                raise GraphError(
+                    f'source {self.name!r}: input name {self.value!r} {why}; the value of a '
+                    'source is the name of its input, so leave it out: numbers come when it is '
+                    'simulated')
             return
         if not isinstance(self.value, str) or not self.value:
             raise GraphError(f'branch {self.name!r} has no value; {article(self.kind.value)} '
@@ -332,9 +340,8 @@ class TwoPort:
 
 
 def _check_name(name: str, what: str) -> None:
-    if not isinstance(name, str) or not is_name(name):
-        raise GraphError(f'{what} name {name!r} must be letters, digits and underscores, '
-                         'and not start with a digit')
+    if why := why_no_name(name):
+        raise GraphError(f'{what} name {name!r} {why}')
 
 
 def _check_node(node: str, owner: str) -> None:

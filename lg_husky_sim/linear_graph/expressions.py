@@ -15,6 +15,7 @@ from functools import lru_cache
 import keyword
 import math
 import operator
+import re
 from types import CodeType
 from typing import Any, TypeGuard
 
@@ -25,6 +26,7 @@ FUNCTIONS: Mapping[str, Any] = {
     'tanh': math.tanh, 'exp': math.exp, 'abs': abs}
 CONSTANTS: Mapping[str, float] = {'pi': math.pi}
 GLOBALS: Mapping[str, Any] = {'__builtins__': {}, **FUNCTIONS, **CONSTANTS}
+NO_NUMBERS = ('nan', 'inf', 'infinity')
 MAX_LENGTH = 500
 MAX_DEPTH = 40
 MAX_EXPONENT = 16.0
@@ -35,10 +37,20 @@ _BINARY: Mapping[type[ast.operator], Callable[[float, float], Any]] = {
 _UNARY = (ast.UAdd, ast.USub)
 
 
-def is_name(text: str) -> bool:
-    """Tell whether the text can name a parameter, an input or an element."""
-    return (text.isascii() and text.isidentifier() and not keyword.iskeyword(text)
-            and not text.startswith('__'))
+def why_no_name(text: object) -> str:
+    """Return why the text cannot name a parameter, an input or an element; '' if it can."""
+    if not (isinstance(text, str) and text.isascii() and text.isidentifier()
+            and not text.startswith('__')):
+        return 'must be letters, digits and underscores, and not start with a digit'
+    if keyword.iskeyword(text):
+        return 'is a reserved word; choose another name'
+    if text in CONSTANTS:
+        return 'is a constant of expressions; choose another name'
+    if text in FUNCTIONS:
+        return 'is a function of expressions; choose another name'
+    if text.lower() in NO_NUMBERS:
+        return 'is no finite number and no name; write a number or another name'
+    return ''
 
 
 @lru_cache(maxsize=4096)
@@ -67,6 +79,9 @@ def parse(text: str) -> ast.expr:
     try:
         tree = ast.parse(text.strip(), mode='eval').body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        if words := [word for word in re.findall(r'\w+', text) if keyword.iskeyword(word)]:
+            raise GraphError(f'expression {shown} cannot be read: {words[0]!r} is a reserved '
+                             'word; choose another name') from error
         raise GraphError(f'expression {shown} cannot be read: it must be made of names, numbers, '
                          f'+ - * / ** and {", ".join(FUNCTIONS)}') from error
     _check(tree, shown, MAX_DEPTH)
@@ -136,8 +151,8 @@ def _check(node: ast.expr, shown: str, depth: int) -> None:
     if isinstance(node, ast.Name):
         if node.id in FUNCTIONS:
             raise GraphError(f'expression {shown}: {node.id} is a function and needs an argument')
-        if not is_name(node.id):
-            raise GraphError(f'expression {shown}: {node.id!r} is not a plain name')
+        if node.id not in CONSTANTS and (why := why_no_name(node.id)):
+            raise GraphError(f'expression {shown}: {node.id!r} {why}')
         return
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         if node.func.id not in FUNCTIONS:
@@ -147,6 +162,8 @@ def _check(node: ast.expr, shown: str, depth: int) -> None:
             raise GraphError(f'expression {shown}: {node.func.id} takes exactly one argument')
         _check(node.args[0], shown, depth - 1)
         return
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
+        raise GraphError(f'expression {shown}: write ** in place of ^ for a power')
     raise GraphError(f'expression {shown}: {type(node).__name__} is not allowed; use names, '
                      f'numbers, + - * / ** and {", ".join(FUNCTIONS)}')
 

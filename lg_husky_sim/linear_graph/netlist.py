@@ -42,7 +42,7 @@ from lg_husky_sim.linear_graph.elements import (
     TWO_PORT_KINDS,
     TwoPort,
 )
-from lg_husky_sim.linear_graph.expressions import is_name, names_in
+from lg_husky_sim.linear_graph.expressions import names_in, why_no_name
 from lg_husky_sim.linear_graph.graph import GROUND, LinearGraph, suggestion
 from lg_husky_sim.linear_graph.netlist_schema import (
     ELEMENTS,
@@ -140,8 +140,8 @@ def _netlist(data: Any) -> Netlist:
     values: dict[str, float] = {}
     units: dict[str, str] = {}
     for name, given in parameters.items():
-        if not is_name(name):
-            raise ModelFileError(f'parameter name {name!r} must be letters, digits and _')
+        if why := why_no_name(name):
+            raise ModelFileError(f'parameter name {name!r} {why}')
         if given is None:
             continue
         number, unit = _quantity(given, f'parameter {name}')
@@ -191,8 +191,8 @@ def _names(element: Branch | TwoPort) -> tuple[str, ...]:
 
 def _element(name: str, given: Any, values: dict[str, float], units: dict[str, str],
              ground: Ground) -> Branch | TwoPort:
-    if not is_name(name):
-        raise ModelFileError(f'element name {name!r} must be letters, digits and _')
+    if why := why_no_name(name):
+        raise ModelFileError(f'element name {name!r} {why}')
     entry = _mapping(given, f'element {name!r}', None)
     what = _text(entry.get('is', ''), 'is')
     two_ports = {kind.value: kind for kind in TWO_PORT_KINDS}
@@ -222,7 +222,9 @@ def _element(name: str, given: Any, values: dict[str, float], units: dict[str, s
     if law is not None:
         return Branch(name, kind, domain, tail, head, form=form, characteristic=law)
     if kind in SOURCES:
-        return Branch(name, kind, domain, tail, head, _text(entry.get('value', ''), 'value'))
+        given = entry.get('value', '')
+        return Branch(name, kind, domain, tail, head,
+                      _text(given if isinstance(given, str) else str(given), 'value'))
     branch = Branch(name, kind, domain, tail, head, '1', form)
     return replace(branch, value=_value(entry, branch, values, units))
 
@@ -282,11 +284,11 @@ def _port(given: Any, what: str, ground: Ground) -> Port:
 
 
 def _ground(given: Any) -> Ground:
-    if isinstance(given, str):
-        return given
+    if isinstance(given, int | str) and not isinstance(given, bool):
+        return str(given)
     domains = {domain.value: domain for domain in Domain}
     entry = _mapping(given, 'ground', domains)
-    return {domains[key]: _text(node, 'ground') for key, node in entry.items()}
+    return {domains[key]: _node(entry, key, None) for key in entry}
 
 
 def _ground_of(ground: Ground, domain: Domain) -> str:

@@ -9,6 +9,7 @@ import keyword
 from typing import Any
 
 from lg_husky_sim.linear_graph.elements import Domain, Form, Kind, SOURCES, TWO_PORT_KINDS
+from lg_husky_sim.linear_graph.expressions import CONSTANTS, FUNCTIONS
 from lg_husky_sim.linear_graph.laws import LAWS
 
 _EVERYDAY: Mapping[Domain, Mapping[str, Kind]] = {
@@ -36,7 +37,8 @@ QUANTITY = r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*'
 _TEXT: dict[str, Any] = {'type': 'string', 'maxLength': LONGEST_TEXT}
 _TEXTS = {'type': 'array', 'items': _TEXT}
 _NODE = {'type': ['string', 'integer']}
-_NAMES = {'pattern': f'^(?!__)(?!({"|".join(keyword.kwlist)})$)[A-Za-z_][A-Za-z0-9_]*$'}
+_TAKEN = '|'.join((*keyword.kwlist, *CONSTANTS, *FUNCTIONS))
+_NAMES = {'pattern': f'^(?!__)(?!({_TAKEN})$)[A-Za-z_][A-Za-z0-9_]*$'}
 _LAW = {
     'law': {'anyOf': [{'enum': list(LAWS)}, _TEXT],
             'description': 'A named law, or an expression in z1, z2, ... and its parameters; in '
@@ -77,8 +79,8 @@ TOP: dict[str, Any] = {
         'name': {**_TEXT, 'description': 'Title.'},
         'about': {**_TEXT, 'description': 'Free text, such as the source of the system.'},
         'ground': {'description': 'Name of the ground node, or one for each domain.', 'anyOf': [
-            _TEXT, {'type': 'object', 'additionalProperties': False,
-                    'properties': {domain.value: _TEXT for domain in Domain}}]},
+            _NODE, {'type': 'object', 'additionalProperties': False,
+                    'properties': {domain.value: _NODE for domain in Domain}}]},
         'parameters': {
             'type': ['object', 'null'], 'propertyNames': _NAMES,
             'description': 'Numbers that expressions use, each with its unit.',

@@ -9,6 +9,7 @@ No computer algebra is involved: the algebraic variables are found by one small 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from lg_husky_sim.errors import GraphError, ParameterError
@@ -16,7 +17,7 @@ from lg_husky_sim.linear_graph.expressions import compile_tuple, evaluate, GLOBA
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.loops import effort_order
 from lg_husky_sim.linear_graph.modular import generic_numbers
-from lg_husky_sim.linear_graph.state_space import FloatArray, StateSpace
+from lg_husky_sim.linear_graph.state_space import FloatArray, MATRICES, StateSpace
 from lg_husky_sim.linear_graph.structure import analyse, Structure
 import numpy as np
 
@@ -225,6 +226,15 @@ class NumericModel:
             feed_derivative[q:], rates[:, n + m:n + m + k], arguments[:, :n],
             arguments[:, n:n + m], out[:, n + m:n + m + k], arguments[:, n + m:n + m + k],
             *self._names)
+
+    def generic(self) -> StateSpace:
+        """Return the model with generic values: what is zero in it is zero for all values."""
+        rows, storage = self._parts(self._generic_values())
+        found = self._state_space(rows, storage)
+        clean: dict[str, Any] = {
+            name: np.where(np.abs(matrix) > TOLERANCE, matrix, 0.0)
+            for name, matrix in ((name, getattr(found, name)) for name in MATRICES)}
+        return replace(found, **clean)
 
     def _generic_values(self) -> FloatArray:
         """Return generic positive values, the same for the same parameter."""

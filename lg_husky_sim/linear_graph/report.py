@@ -12,7 +12,7 @@ from lg_husky_sim.linear_graph.equations import Equations, latex_of, state_equat
 from lg_husky_sim.linear_graph.expressions import evaluate, names_in
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.numeric import NumericModel
-from lg_husky_sim.linear_graph.state_space import MATRICES
+from lg_husky_sim.linear_graph.state_space import equation_forms, MATRICES
 from lg_husky_sim.linear_graph.symbolic import SymbolicStateSpace
 from lg_husky_sim.linear_graph.units import unit_needed
 
@@ -66,6 +66,10 @@ def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
                   f'  z = [{", ".join(model.arguments)}]']
     if model.dependent:
         parts.append(f'  excess storages, which add no state: {", ".join(model.dependent)}')
+    parts.append(f'  {", ".join(equation_forms(model))}')
+    if _is_shown('E', model.E):
+        parts.append('  E acts on the rate of change of inputs; in standard form it is zero, and '
+                     'the states are x - E u')
     parts += ['', *(f'  {line}' for line in state_equations(model)), '']
     for name in MATRICES:
         matrix = getattr(model, name)
@@ -147,13 +151,32 @@ def latex_report(title: str, steps: Equations, model: SymbolicStateSpace,
     -------
     str
     """
-    import sympy
-
     parts = [*(f'% {" ".join(text.split())}' for text in (title, note) if text), steps.latex,
              '% State-space model']
+    for left, terms in _equations_latex(model):
+        right = ' + '.join(f'{matrix} {column}' for matrix, column in terms)
+        parts.append(rf'\[ {left} = {right or 0} \]')
+    parts += [rf'\[ {name} = {_matrix_latex(getattr(model, name))} \]' for name in MATRICES
+              if _is_shown(name, getattr(model, name))]
+    return '\n'.join(parts)
+
+
+def state_equation_latex(model: SymbolicStateSpace) -> str:
+    """Return the equations of x, y and z with their matrices as LaTeX, without delimiters."""
+    lines = []
+    for left, terms in _equations_latex(model):
+        right = ' + '.join(f'{_matrix_latex(getattr(model, matrix))} {column}'
+                           for matrix, column in terms)
+        lines.append(f'{left} &= {right or 0}')
+    return '\\begin{aligned} ' + r' \\ '.join(lines) + r' \end{aligned}'
+
+
+def _equations_latex(model: SymbolicStateSpace) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Return what stands left of each equation, and right of it matrices and their columns."""
     state, inputs, effort = (_column(names) for names in
                              (model.states, model.inputs, model.efforts))
     rate = rf'\frac{{d}}{{dt}} {inputs}'
+    found = []
     for left, shown, terms in (
             (rf'\frac{{d}}{{dt}} {state}', model.states,
              (('A', state), ('B', inputs), ('E', rate), ('G', effort))),
@@ -162,27 +185,16 @@ def latex_report(title: str, steps: Equations, model: SymbolicStateSpace,
             (_column(model.arguments), model.arguments,
              (('H', state), ('K', inputs), ('N', effort)))):
         if shown:
-            right = ' + '.join(f'{matrix} {column}' for matrix, column in terms
-                               if _is_shown(matrix, getattr(model, matrix)))
-            parts.append(rf'\[ {left} = {right or 0} \]')
-    for name in MATRICES:
-        matrix = getattr(model, name)
-        if _is_shown(name, matrix):
-            names = {symbol: latex_of(symbol.name) for symbol in matrix.free_symbols}
-            body = sympy.latex(matrix, mat_str='bmatrix', mat_delim='', symbol_names=names)
-            parts.append(rf'\[ {name} = {body} \]')
-    return '\n'.join(parts)
+            found.append((left, [(matrix, column) for matrix, column in terms
+                                 if _is_shown(matrix, getattr(model, matrix))]))
+    return found
 
 
-def state_equation_latex(model: SymbolicStateSpace) -> str:
-    """Return dx/dt = A x + B u as one formula of LaTeX, without delimiters."""
+def _matrix_latex(matrix: Any) -> str:
     import sympy
 
-    a, b = (sympy.latex(matrix, mat_str='bmatrix', mat_delim='', symbol_names={
-        symbol: latex_of(symbol.name) for symbol in matrix.free_symbols})
-        for matrix in (model.A, model.B))
-    return (rf'\frac{{d}}{{dt}} {_column(model.states)} = {a} {_column(model.states)}'
-            rf' + {b} {_column(model.inputs)}')
+    return str(sympy.latex(matrix, mat_str='bmatrix', mat_delim='', symbol_names={
+        symbol: latex_of(symbol.name) for symbol in matrix.free_symbols}))
 
 
 def _column(names: tuple[str, ...]) -> str:

@@ -5,12 +5,41 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 MATRICES = ('A', 'B', 'C', 'D', 'E', 'F', 'G', 'H', 'K', 'L_c', 'N')
+
+_EQUATIONS = (('states', 'dx/dt', 'A x', 'B u', 'E du/dt', 'G f(z)'),
+              ('outputs', 'y', 'C x', 'D u', 'F du/dt', 'L_c f(z)'),
+              ('arguments', 'z', 'H x', 'K u', 'N f(z)'))
+
+
+def equation_forms(model: Any) -> tuple[str, ...]:
+    """
+    Return the equations that a model has, such as ``dx/dt = A x + B u``.
+
+    Parameters
+    ----------
+    model : StateSpace or SymbolicStateSpace
+        Matrices but A, B, C and D are left out where they are zero.
+
+    Returns
+    -------
+    tuple of str
+        Of x, and of y and z where there are any.
+    """
+    found = []
+    for names, left, *terms in _EQUATIONS:
+        if getattr(model, names):
+            matrices = [(term, getattr(model, term.split()[0])) for term in terms]
+            found.append(f'{left} = ' + ' + '.join(
+                term for term, matrix in matrices if 0 not in matrix.shape
+                and (term[0] in 'ABCD' or bool(np.any(np.asarray(matrix) != 0)))))
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,4 +120,5 @@ class StateSpace:
             if matrix.size and (field.name in 'ABCD' or matrix.any()):
                 parts.append(f'{field.name} =\n{np.array2string(matrix, max_line_width=99)}')
         return '\n'.join([f'x = {", ".join(self.states)}', f'u = {", ".join(self.inputs)}',
-                          f'y = {", ".join(self.outputs)}', *parts])
+                          f'y = {", ".join(self.outputs)}', *equation_forms(self),
+                          *parts])

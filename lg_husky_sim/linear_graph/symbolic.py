@@ -108,8 +108,8 @@ def derive(graph: LinearGraph, outputs: Sequence[str] = (), *,
     Raises
     ------
     GraphError
-        As :func:`~lg_husky_sim.linear_graph.compile_numeric`; by element also if a parameter of a
-        law has the name of an element of another value.
+        As :func:`~lg_husky_sim.linear_graph.compile_numeric`; by element also if a parameter has
+        the name of an element of another value, or an input that of either.
     """
     import sympy
 

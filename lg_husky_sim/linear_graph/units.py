@@ -230,7 +230,8 @@ def _compare(element: Branch | TwoPort, found: Dimension, shown: str) -> None:
         form = f' ({element.given_form.value})' if element.given_form else ''
     hint = ''
     if found == tuple(-power for power in expected):
-        hint = '; it is the inverse, so invert the value or choose the other form'
+        hint = '; it is the inverse, so invert the value' + (
+            ' or choose the other form' if form else '')
     raise GraphError(f'unit of {element.name!r}: {shown} does not fit {article(what)}{form}, '
                      f'which needs {needed}{hint}')
 
