@@ -196,3 +196,19 @@ def test_a_diagnosis_without_end_is_refused(tmp_path: Path) -> None:
     (tmp_path / 'diagnosis.json').write_text('[' * 100_000, encoding='utf-8')
     with pytest.raises(SettingsError, match='is not a diagnosis: maximum recursion'):
         run('plan-drive', str(tmp_path), '--out', str(tmp_path / 'drive.yaml'))
+
+
+@pytest.mark.parametrize('verb', ['info', 'simulate', 'identify', 'evaluate', 'diagnose'])
+def test_a_robot_is_given_to_every_verb_by_the_same_word(verb: str) -> None:
+    command = main.cli.get_command(click.Context(main.cli), verb)
+    assert command is not None
+    flags = next(one.opts for one in command.params if '--model' in one.opts)
+    assert '--robot' in flags
+
+
+def test_what_a_drive_can_determine_is_said_of_the_robot_that_is_given(drive: str, tmp_path: Path
+                                                                       ) -> None:
+    lg.Husky(mass=90.0, command_gain=0.7).save(tmp_path / 'robot.yaml')
+    said = run('info', drive, '--robot', str(tmp_path / 'robot.yaml'), '--json')
+    assert '0.7' in said.stdout
+    assert said.stdout != run('info', drive, '--json').stdout

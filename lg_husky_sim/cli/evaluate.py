@@ -36,7 +36,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.option('--steps', 'steps', multiple=True, metavar='REC [REC …]', type=RECORDING,
               help='A recording of commanded steps: fit every other step, predict the rest, '
                    'compared with three simple models; may be given several times.')
-@model_option('--model')
+@model_option('--model', '--robot', 'model')
 @settings_option
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
               help='Seed of all random numbers: starting points, genes, noise.')

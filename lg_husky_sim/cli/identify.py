@@ -27,7 +27,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='FILE.yaml',
               help='Model file to write; the report is next to it as .txt, .json and .html. '
                    'With --each a folder that gets these files for every recording.')
-@model_option('--model')
+@model_option('--model', '--robot', 'model')
 @settings_option
 @click.option('--free', multiple=True, metavar='NAMES', type=PARAMETERS,
               help='Parameters to estimate, separated by commas; by default those that the model '

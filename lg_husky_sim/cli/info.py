@@ -21,7 +21,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.command(cls=SeveralWords,
                short_help='Show what recordings contain and are good for, before any fit.')
 @click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]', type=RECORDING)
-@model_option('--model')
+@model_option('--model', '--robot', 'model')
 @settings_option
 @topics_option
 @spoken()

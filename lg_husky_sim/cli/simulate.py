@@ -20,7 +20,7 @@ from lg_husky_sim.cli.several import SeveralWords
 
 @click.command(cls=SeveralWords,
                short_help='Drive a model with commands; write a rosbag2.')
-@model_option('--model')
+@model_option('--model', '--robot', 'model')
 @click.option('--commands', required=True, metavar='REC|SCRIPT.yaml|NAME', type=COMMANDS,
               help='A recording, whose commands are driven from its initial pose; a command '
                    'script; or a built-in manoeuvre (lg_husky manoeuvres lists them).')
