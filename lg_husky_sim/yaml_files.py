@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""YAML as people write it: one error line with its place, no duplicate keys, 1e-3 is a number."""
+"""YAML as people write it: an error is one line, no duplicate keys, 1e-3 a number, 010 none."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _Base: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
 class _Loader(_Base):  # type: ignore[misc]
-    """The safe loader, without its two traps: duplicate keys, and 1e-3 read as a text."""
+    """The safe loader without its traps: duplicate keys, 1e-3 read as a text, 010 read as 8."""
 
 
 def _unique_mapping(loader: Any, node: yaml.MappingNode) -> dict[Hashable, Any]:
@@ -58,6 +58,11 @@ def _short_number(kind: str) -> Callable[[Any, yaml.Node], object]:
         if len(node.value) > LONGEST_NUMBER:
             raise yaml.constructor.ConstructorError(
                 None, None, f'a number of more than {LONGEST_NUMBER} characters', node.start_mark)
+        if ':' in node.value or re.fullmatch(r'[-+]?0[0-7_]+', node.value):
+            base = 60 if ':' in node.value else 8
+            raise yaml.constructor.ConstructorError(
+                None, None, f'{node.value} is a number of base {base} in YAML; '
+                'write a decimal number, or put it in quotes', node.start_mark)
         value: object = construct(loader, node)
         return value
     return number

@@ -35,7 +35,10 @@ def test_scalars_are_what_people_mean(text: str, value: object) -> None:
     ('[' * 100_000, '^not YAML: (nested deeper than 50 levels$|exceeded maximum nesting depth)'),
     ('[*b]', r'^not YAML: found undefined alias'),
     ('a: &a [1, {b: *a}]', '^not YAML: a contains itself$'),
-    (f'a: {":".join(["1"] * 200)}.5', '^not YAML: int too large to convert to float$'),
+    (f'a: {":".join(["1"] * 200)}.5', r'^not YAML: 1:1:.* in line 1, column 4$'),
+    ('a: 1:30', '^not YAML: 1:30 is a number of base 60 in YAML; write a decimal number, or put '
+     'it in quotes in line 1, column 4$'),
+    ('a: 010', '^not YAML: 010 is a number of base 8 in YAML; write a decimal number'),
     (f'a: {":".join(["1"] * 1_900_000)}', '^not YAML: a number of more than 500 characters in '),
     (f'a: 0x{"f" * 501}', '^not YAML: a number of more than 500 characters in line 1, column 4$'),
     (f'a: !{"x" * 3_000_000} 1', '^not YAML: could not determine a constructor'),

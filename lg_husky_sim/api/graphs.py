@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 import os
 from pathlib import Path
 from typing import Any
 
 from lg_husky_sim.api.tables import page_part, Table
-from lg_husky_sim.errors import LgHuskyError, ParameterError
+from lg_husky_sim.errors import GraphError, LgHuskyError, ParameterError
 from lg_husky_sim.linear_graph import (
     compile_numeric,
     derive,
@@ -20,7 +21,7 @@ from lg_husky_sim.linear_graph import (
     StateSpace,
     SymbolicStateSpace,
 )
-from lg_husky_sim.linear_graph.netlist import parse_netlist, read_netlist
+from lg_husky_sim.linear_graph.netlist import netlist_of, parse_netlist, read_netlist
 
 
 class Graph:
@@ -44,18 +45,33 @@ class Graph:
         Variables to put out, such as ``'v(M_H)'``.
     note : str
         What to say of the matrices.
+    source : str
+        File that it comes from, for messages.
     """
 
+    source = ''
+
     def __init__(self, name: str, graph: LinearGraph, values: Mapping[str, float],
-                 outputs: Sequence[str] = (), note: str = '') -> None:
+                 outputs: Sequence[str] = (), note: str = '', source: str = '') -> None:
         """Keep what the matrices are derived from when they are first asked for."""
         self.name, self.graph, self.values = name, graph, dict(values)
-        self.outputs, self.note = tuple(outputs), note
+        self.outputs, self.note, self.source = tuple(outputs), note, source
+
+    @contextmanager
+    def _in_file(self) -> Iterator[None]:
+        """Let errors say which file they are about."""
+        try:
+            yield
+        except (GraphError, ParameterError) as error:
+            if not self.source or str(error).startswith(f'{self.source}: '):
+                raise
+            raise type(error)(f'{self.source}: {error}') from error
 
     @cached_property
     def symbolic(self) -> SymbolicStateSpace:
         """The model in symbols, each element's value under the element's own name."""
-        return derive(self.graph, self.outputs, by_element=True)
+        with self._in_file():
+            return derive(self.graph, self.outputs, by_element=True)
 
     @property
     def A(self) -> Any:
@@ -121,12 +137,16 @@ class Graph:
         ParameterError
             If a parameter is unknown, has no number, or one that is not allowed.
         """
-        model = compile_numeric(self.graph, self.outputs, chained=True)
-        for name in values:
-            if name not in (*self.values, *model.parameters):
-                raise ParameterError(f'unknown parameter {name!r} '
-                                     f'(known: {", ".join(model.parameters)})')
-        return model.at({**self.values, **values})
+        with self._in_file():
+            model = compile_numeric(self.graph, self.outputs, chained=True)
+            laws = model.structure.laws.values()
+            known = dict.fromkeys((*model.parameters, *(p for law in laws for p in law.parameters),
+                                   *self.values))
+            for name in values:
+                if name not in known:
+                    raise ParameterError(f'unknown parameter {name!r} '
+                                         f'(known: {", ".join(known)})')
+            return model.at({**self.values, **values})
 
     def text(self, by_parameter: bool = False) -> str:
         """
@@ -140,12 +160,13 @@ class Graph:
         from lg_husky_sim.linear_graph.equations import equations
         from lg_husky_sim.linear_graph.report import text_report
 
-        numeric = compile_numeric(self.graph, self.outputs, chained=True)
-        known = all(name in self.values for name in numeric.parameters)
-        return text_report(
-            self.name, equations(self.graph, by_element=not by_parameter),
-            self._symbolic(by_parameter), None if by_parameter else self.graph,
-            (numeric, self.values) if known else None, self.note)
+        with self._in_file():
+            numeric = compile_numeric(self.graph, self.outputs, chained=True)
+            known = all(name in self.values for name in numeric.parameters)
+            return text_report(
+                self.name, equations(self.graph, by_element=not by_parameter),
+                self._symbolic(by_parameter), None if by_parameter else self.graph,
+                (numeric, self.values) if known else None, self._notes())
 
     def latex(self, by_parameter: bool = False) -> str:
         """
@@ -159,8 +180,20 @@ class Graph:
         from lg_husky_sim.linear_graph.equations import equations
         from lg_husky_sim.linear_graph.report import latex_report
 
-        return latex_report(self.name, equations(self.graph, by_element=not by_parameter),
-                            self._symbolic(by_parameter), self.note)
+        with self._in_file():
+            return latex_report(self.name, equations(self.graph, by_element=not by_parameter),
+                                self._symbolic(by_parameter), self._notes())
+
+    def _notes(self) -> str:
+        """Return the note, and why a graph with some numbers has no matrices in numbers."""
+        numeric = compile_numeric(self.graph, self.outputs, chained=True)
+        if not self.values or all(name in self.values for name in numeric.parameters):
+            return self.note
+        try:
+            numeric.at(self.values)
+        except ParameterError as error:
+            return '. '.join([self.note] * bool(self.note) + [f'No numbers: {error}'])
+        return self.note
 
     def draw(self, path: str | os.PathLike[str]) -> Path:
         """
@@ -244,15 +277,16 @@ class Graph:
         return page_part(self.name, [self.note] * bool(self.note), [variables, numbers])
 
 
-def graph(source: str | os.PathLike[str] | LinearGraph, outputs: Sequence[str] = ()) -> Graph:
+def graph(source: str | os.PathLike[str] | dict[str, Any] | LinearGraph,
+          outputs: Sequence[str] = ()) -> Graph:
     """
     Read a linear graph of your own.
 
     Parameters
     ----------
-    source : path-like, str or LinearGraph
-        A netlist file, the text of one (with a line break in it), a graph made in Python; or
-        ``simplified`` or ``expanded``, the paper's two graphs of the Husky.
+    source : path-like, str, dict or LinearGraph
+        A netlist file, the text of one (with a line break in it), its content as a dict, a graph
+        made in Python; or ``simplified`` or ``expanded``, the paper's two graphs of the Husky.
     outputs : sequence of str
         Variables to put out, such as ``'omega(J_1)'``; those of the netlist by default.
 
@@ -266,15 +300,23 @@ def graph(source: str | os.PathLike[str] | LinearGraph, outputs: Sequence[str] =
         If the file is no netlist.
     GraphError
         If the graph cannot be built.
+    TypeError
+        If the source is of another type.
     """
+    if not isinstance(source, str | os.PathLike | LinearGraph | dict):
+        raise TypeError(f'lg.graph takes a netlist file, the text or the dict of one, or a '
+                        f'LinearGraph, not {type(source).__name__}')
     if isinstance(source, str) and source in ('simplified', 'expanded'):
         from lg_husky_sim.api.robots import paper_graph
         return paper_graph(source, outputs)
     if isinstance(source, LinearGraph):
         return Graph('linear graph', source, {}, outputs)
-    if isinstance(source, str) and '\n' in source:
+    if isinstance(source, dict):
+        netlist = netlist_of(source)
+    elif isinstance(source, str) and '\n' in source:
         netlist = parse_netlist(source)
     else:
         netlist = read_netlist(Path(source))
+    text = isinstance(source, dict) or '\n' in str(source)
     return Graph(netlist.name, netlist.graph, netlist.values, outputs or netlist.outputs,
-                 netlist.about)
+                 netlist.about, '' if text else str(source))

@@ -204,6 +204,7 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
     if title:
         figure.suptitle(title, fontsize=11, y=1.0 - 0.4 * HEADING / inches, va='center',
                         parse_math=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
     # a fixed salt and no date: the same graph gives the same file
     with tempfile.TemporaryDirectory(dir=path.parent) as folder, rc_context(
             {'svg.hashsalt': 'lg_husky_sim', 'svg.fonttype': 'none'}):

@@ -128,7 +128,7 @@ def equations(graph: LinearGraph, *, by_element: bool = False) -> Equations:
     Raises
     ------
     GraphError
-        If the graph has no normal tree or no state.
+        If the graph has no normal tree.
     """
     structure = analyse(graph)
     texts = {value.owner: value.owner if by_element else value.text

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 import json
 import os
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.extras import require
 from lg_husky_sim.linear_graph.state_space import FloatArray, MATRICES, StateSpace
+import numpy as np
 
 SCHEMA = 'lg_husky_sim/state_space/1'
 _NAMES = ('states', 'inputs', 'outputs', 'efforts', 'arguments')
@@ -34,6 +36,8 @@ def linear(space: StateSpace) -> StateSpace:
     """
     Return a model that A, B, C and D hold whole, but for laws that are not linear.
 
+    Where a state is x - E u, it is called so, such as ``V(C_1) - E u``.
+
     Raises
     ------
     SettingsError
@@ -44,12 +48,44 @@ def linear(space: StateSpace) -> StateSpace:
         raise SettingsError(
             'outputs depend on the rate of change of an input (matrix F is not zero); only .json, '
             '.mat and .npz can hold such a model')
-    return proper
+    return replace(proper, states=tuple(
+        f'{name} - E u' if space.E[at].any() else name for at, name in enumerate(space.states)))
+
+
+def _shifted(space: StateSpace) -> list[str]:
+    """Say of each state of the standard form that is not x what it is, in numbers."""
+    found = []
+    for name, row in zip(space.states, space.E, strict=True):
+        terms = ''.join(f' {"+" if value < 0.0 else "-"} {float(abs(value))!r} {source}'
+                        for value, source in zip(row, space.inputs, strict=True) if value != 0.0)
+        found += [f'{name} - E u = {name}{terms}'] * bool(terms)
+    return found
+
+
+def _with_input(space: StateSpace) -> StateSpace:
+    if space.inputs:
+        return space
+    return replace(space, inputs=('none',), B=np.zeros((len(space.states), 1)),
+                   D=np.zeros((len(space.outputs), 1)))
+
+
+def _label(names: Sequence[str]) -> list[str]:
+    """Return names that python-control takes: it has no dots in them."""
+    found: list[str] = []
+    for name in names:
+        label = name.replace('.', '_')
+        while label in found or (label != name and label in names):
+            label += '_'
+        found.append(label)
+    return found
 
 
 def to_control(space: StateSpace) -> Any:
     """
     Return the linear part as a python-control ``StateSpace``, with its names.
+
+    Ports are called ``Q(ram_1)`` in place of ``Q(ram.1)``: control allows no dots. It needs an
+    input, too: a model without gets one of zeros, called ``none``.
 
     Raises
     ------
@@ -61,9 +97,9 @@ def to_control(space: StateSpace) -> Any:
     require('control', 'make a python-control system')
     import control
 
-    own = linear(space)
-    return control.ss(own.A, own.B, own.C, own.D, states=list(own.states),
-                      inputs=list(own.inputs), outputs=list(own.outputs))
+    own = _with_input(linear(space))
+    return control.ss(own.A, own.B, own.C, own.D, states=_label(own.states),
+                      inputs=_label(own.inputs), outputs=_label(own.outputs))
 
 
 def to_scipy(space: StateSpace) -> Any:
@@ -151,7 +187,6 @@ def _as_json(space: StateSpace, name: str, parameters: Mapping[str, float]) -> b
 def _as_mat(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
     from io import BytesIO
 
-    import numpy as np
     from scipy.io import savemat
 
     stream = BytesIO()
@@ -166,8 +201,6 @@ def _as_mat(space: StateSpace, name: str, parameters: Mapping[str, float]) -> by
 def _as_npz(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
     from io import BytesIO
 
-    import numpy as np
-
     stream = BytesIO()
     texts = {key: np.array(getattr(space, key), dtype=np.str_) for key in _NAMES}
     arrays: dict[str, Any] = {
@@ -181,8 +214,9 @@ def _as_npz(space: StateSpace, name: str, parameters: Mapping[str, float]) -> by
 def _as_c(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
     own = linear(space)
     lines = [f'/* {_comment(name)}: dx/dt = A x + B u, y = C x + D u; SI units.',
-             *(f' *   {letter}: {", ".join(names)}' for letter, names in
+             *(f' *   {letter}: {", ".join(names) or "none"}' for letter, names in
                (('x', own.states), ('u', own.inputs), ('y', own.outputs))),
+             *(f' *   {line}' for line in _shifted(space)),
              *([f' * Non-linear laws are left out: {", ".join(own.efforts)}']
                if own.efforts else []), ' */',
              '#ifndef LG_HUSKY_MODEL_H', '#define LG_HUSKY_MODEL_H', '']
@@ -190,6 +224,8 @@ def _as_c(space: StateSpace, name: str, parameters: Mapping[str, float]) -> byte
               (('STATES', own.states), ('INPUTS', own.inputs), ('OUTPUTS', own.outputs))]
     for key in 'ABCD':
         matrix = getattr(own, key)
+        if not matrix.size:     # no array of C
+            continue
         rows = ',\n'.join('    {' + ', '.join(repr(float(v)) for v in row) + '}'
                           for row in matrix)
         lines += ['', f'static const double lg_husky_{key}[{matrix.shape[0]}]'
@@ -202,9 +238,10 @@ def _as_latex(space: StateSpace, name: str, parameters: Mapping[str, float]) -> 
     left_out = [f'% Non-linear laws are left out: {", ".join(own.efforts)}'
                 ] if own.efforts else []
     lines = [f'% {_comment(name)}; needs amsmath',
-             *(f'% {letter}: {", ".join(names)}' for letter, names in
-               (('x', own.states), ('u', own.inputs), ('y', own.outputs))), *left_out]
-    for key in 'ABCD':
+             *(f'% {letter}: {", ".join(names) or "none"}' for letter, names in
+               (('x', own.states), ('u', own.inputs), ('y', own.outputs))),
+             *(f'% {line}' for line in _shifted(space)), *left_out]
+    for key in (key for key in 'ABCD' if getattr(own, key).size):
         rows = ' \\\\\n'.join(' & '.join(repr(float(v)) for v in row)
                               for row in getattr(own, key))
         lines += [rf'\[ {key} = \begin{{bmatrix}}', rows, r'\end{bmatrix} \]']
@@ -212,16 +249,18 @@ def _as_latex(space: StateSpace, name: str, parameters: Mapping[str, float]) -> 
 
 
 def _as_python(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
-    own = linear(space)
+    own = _with_input(linear(space))
     left_out = f'\n\nNon-linear laws are left out: {", ".join(own.efforts)}.' if (
         own.efforts) else ''
-    matrices = '\n'.join(f'{key} = {getattr(own, key).tolist()!r}' for key in 'ABCD')
-    names = '\n'.join(f'{key} = {list(getattr(own, key))!r}' for key in _NAMES[:3])
+    shifted = ''.join(f'\n\nThe state {line}.' for line in _shifted(space))
+    matrices = '\n'.join(f'{key} = {_rows(getattr(own, key))}' for key in 'ABCD')
+    names = '\n'.join(f'{key} = {_label(getattr(own, key))!r}' for key in _NAMES[:3])
+    empty = '' if all(getattr(own, key).size for key in 'ABCD') else 'import numpy as np\n\n'
     return f'''"""
-{_comment(name)}: dx/dt = A x + B u, y = C x + D u; SI units.{left_out}
+{_comment(name)}: dx/dt = A x + B u, y = C x + D u; SI units.{shifted}{left_out}
 """
 
-{names}
+{empty}{names}
 {matrices}
 
 
@@ -238,9 +277,15 @@ def scipy_system():
 '''.encode()
 
 
+def _rows(matrix: FloatArray) -> str:
+    # A list of lists has no second size where it has no rows.
+    return repr(matrix.tolist()) if matrix.size else f'np.zeros({matrix.shape!r})'
+
+
 def _comment(text: str) -> str:
-    # A title may come from a file: it must not end the comment or docstring that it stands in.
-    return re.sub(r'[\\"]|\*/', ' ', ' '.join(text.split()))
+    # A title may come from a file: it must neither end the comment or docstring that it stands
+    # in, nor begin one inside it.
+    return re.sub(r'[\\"]|\*(?=/)|/(?=\*)', ' ', ' '.join(text.split()))
 
 
 _WRITERS: Mapping[str, Callable[[StateSpace, str, Mapping[str, float]], bytes]] = {

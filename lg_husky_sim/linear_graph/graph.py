@@ -293,11 +293,16 @@ class LinearGraph:
         return tuple(branch for branch in self.branches if branch.kind in kinds)
 
 
+def close_name(name: str, known: Iterable[str], cutoff: float = 0.5) -> str:
+    """Return '; did you mean ...?' with the closest known name, or ''."""
+    close = difflib.get_close_matches(name, tuple(known), n=1, cutoff=cutoff)
+    return f'; did you mean {close[0]!r}?' if close else ''
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Return '; did you mean ...?' with the closest known name, or the known names."""
     known = tuple(known)
-    close = difflib.get_close_matches(name, known, n=1)
-    if close:
-        return f'; did you mean {close[0]!r}?'
+    if close := close_name(name, known, cutoff=0.6):
+        return close
     shown = ', '.join(known[:12]) + (', ...' if len(known) > 12 else '')
     return f'; there are {shown}' if known else ''

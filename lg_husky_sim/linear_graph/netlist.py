@@ -109,9 +109,10 @@ def read_netlist(path: str | Path) -> Netlist:
     from lg_husky_sim.yaml_files import brief, read_yaml
 
     try:
-        return _netlist(read_yaml(path, ModelFileError))
-    except (GraphError, ModelFileError) as error:
+        data = read_yaml(path, ModelFileError)
+    except ModelFileError as error:
         raise ModelFileError(f'{path}: {brief(error)}') from error
+    return netlist_of(data, str(path))
 
 
 def parse_netlist(text: str, source: str = 'netlist') -> Netlist:
@@ -128,8 +129,28 @@ def parse_netlist(text: str, source: str = 'netlist') -> Netlist:
     from lg_husky_sim.yaml_files import brief, parse_yaml
 
     try:
-        return _netlist(parse_yaml(text))
-    except (GraphError, ModelFileError, ValueError) as error:
+        data = parse_yaml(text)
+    except ValueError as error:
+        raise ModelFileError(f'{source}: {brief(error)}') from error
+    return netlist_of(data, source)
+
+
+def netlist_of(data: Any, source: str = 'netlist') -> Netlist:
+    """
+    Read a netlist from what a file would hold; see :func:`read_netlist`.
+
+    Parameters
+    ----------
+    data : dict
+        As YAML gives it.
+    source : str
+        What to call it in messages.
+    """
+    from lg_husky_sim.yaml_files import brief
+
+    try:
+        return _netlist(data)
+    except (GraphError, ModelFileError) as error:
         raise ModelFileError(f'{source}: {brief(error)}') from error
 
 

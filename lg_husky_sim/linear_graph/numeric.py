@@ -14,11 +14,12 @@ from typing import Any
 
 from lg_husky_sim.errors import GraphError, ParameterError
 from lg_husky_sim.linear_graph.expressions import compile_tuple, evaluate, GLOBALS, names_in
-from lg_husky_sim.linear_graph.graph import LinearGraph
+from lg_husky_sim.linear_graph.graph import close_name, LinearGraph
 from lg_husky_sim.linear_graph.loops import effort_order
 from lg_husky_sim.linear_graph.modular import generic_numbers
+from lg_husky_sim.linear_graph.singular import culprits, is_rounding, singular_error
 from lg_husky_sim.linear_graph.state_space import FloatArray, MATRICES, StateSpace
-from lg_husky_sim.linear_graph.structure import analyse, Structure
+from lg_husky_sim.linear_graph.structure import analyse, check_asked, Structure
 import numpy as np
 
 SMALLEST = float(np.finfo(np.float64).tiny)
@@ -48,8 +49,8 @@ def compile_numeric(graph: LinearGraph, outputs: Sequence[str] = (), *,
     Raises
     ------
     GraphError
-        If the graph has no normal tree or no state, an output is unknown, or an effort hangs on
-        itself (an algebraic loop through a non-linear law).
+        If the graph has no normal tree, nothing to derive, an output is unknown, or an effort
+        hangs on itself (an algebraic loop through a non-linear law).
 
     Examples
     --------
@@ -61,7 +62,9 @@ def compile_numeric(graph: LinearGraph, outputs: Sequence[str] = (), *,
     >>> compile_numeric(graph, ['v(m)']).at({'m': 2.0, 'b': 3.0}).A
     array([[-1.5]])
     """
-    return NumericModel(analyse(graph, outputs), chained)
+    structure = analyse(graph, outputs)
+    check_asked(structure)
+    return NumericModel(structure, chained)
 
 
 class NumericModel:
@@ -188,10 +191,13 @@ class NumericModel:
         coupling, drive = factor * self._term_algebraic, factor * self._term_known
         if not self._one_each:
             coupling, drive = self._gather @ coupling, self._gather @ drive
+        matrix = self._identity - coupling
         try:
-            solved = np.linalg.solve(self._identity - coupling, drive)
+            solved: FloatArray = np.linalg.solve(matrix, drive)
         except np.linalg.LinAlgError as error:
-            raise self._singular() from error
+            raise self._singular(matrix, raw) from error
+        if is_rounding(matrix, drive, solved):
+            raise self._singular(matrix, raw)
         storage = raw[self._storage]
         np.reciprocal(storage, out=storage, where=self._stiff)
         return self._row_known + self._row_algebraic @ solved, storage
@@ -212,7 +218,13 @@ class NumericModel:
             dependent, coupling = rows[n:n + s], rows[:n, to_excess:] * storage[n:]
             mass = np.diag(storage[:n]) - coupling @ dependent[:, :n]
             right = np.hstack([drive, coupling @ dependent[:, to_input:to_effort]])
-            solved = np.linalg.solve(mass, right)
+            try:
+                solved = np.linalg.solve(mass, right)
+            except np.linalg.LinAlgError as error:
+                names = [self.graph.edges[edge].name for edge in structure.excess]
+                raise ParameterError(
+                    f'the storages around {", ".join(names)} cancel with these values; check the '
+                    'gains of modulated sources') from error
             rates = np.asarray(solved[:, :to_excess], dtype=np.float64)
             derivative = np.asarray(solved[:, to_excess:], dtype=np.float64)
             # through of an excess A-type (across of an excess T-type) = value * d(dependent)/dt
@@ -288,12 +300,12 @@ class NumericModel:
                 f'the argument {self.arguments[row]} of a non-linear law depends on the rate of '
                 f'change of input {self.inputs[column]!r}; put a D-type in series with the source')
 
-    def _singular(self) -> ParameterError:
-        owners = dict.fromkeys(
-            self.structure.values[term.value].owner for term in self.structure.terms)
-        return ParameterError(
-            f'the algebraic equations of {", ".join(owners)} have no single solution with these '
-            'values; check the gains of modulated sources')
+    def _singular(self, matrix: FloatArray, raw: FloatArray) -> ParameterError:
+        structure = self.structure
+        found = {structure.algebraic[at] for at in culprits(matrix)}
+        values = {structure.values[term.value].owner: float(raw[term.value])
+                  for term in structure.terms if term.edge in found}
+        return singular_error(self.graph, tuple(values), values)
 
     def _explained(self, values: Mapping[str, float]) -> ParameterError:
         """Return the error that names the first value that is not allowed."""
@@ -301,8 +313,9 @@ class NumericModel:
             shown = f'{value.owner!r} = {value.text}'
             for name in names_in(value.text):
                 if name not in values:
+                    hint = '' if name in self.graph.names else close_name(name, values)
                     return ParameterError(
-                        f'parameter {name!r} of element {shown} has no value')
+                        f'parameter {name!r} of element {shown} has no value{hint}')
             try:
                 number = evaluate(value.text, values)
             except (ArithmeticError, ValueError, TypeError) as error:

@@ -114,7 +114,8 @@ def _poles(model: NumericModel, values: Mapping[str, float]) -> str:
     poles = model.at(values).poles
     shown = ', '.join(f'{p.real:.6g}' if p.imag == 0.0 else f'{p.real:.6g}{p.imag:+.6g}j'
                       for p in poles)
-    return f'Poles with the numbers of the model [1/s]: {shown}'
+    what = 'Poles of the linear part' if model.efforts else 'Poles'
+    return f'{what} with the numbers of the model [1/s]: {shown or "none, it has no state"}'
 
 
 def _numbers(model: NumericModel, values: Mapping[str, float]) -> str:

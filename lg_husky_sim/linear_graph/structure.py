@@ -181,7 +181,7 @@ def analyse(graph: LinearGraph, outputs: Sequence[str] = ()) -> Structure:
     Raises
     ------
     GraphError
-        If there is no normal tree, no state, or an unknown output.
+        If there is no normal tree, or an unknown output.
     """
     wanted = []
     for text in outputs:
@@ -195,9 +195,6 @@ def analyse(graph: LinearGraph, outputs: Sequence[str] = ()) -> Structure:
                 (*graph.of_kind(Kind.A_TYPE), *graph.of_kind(Kind.T_TYPE))]
     dependent = {graph.edge_index(name) for name in tree.dependent}
     states = tuple(edge for edge in storages if edge not in dependent)
-    if not states:
-        raise GraphError('the graph has no state: it needs an A-type or a T-type whose variable '
-                         'is not fixed by sources and two-ports alone')
     builder = _Builder(graph, in_tree)
     builder.collect()
     return Structure(
@@ -209,6 +206,20 @@ def analyse(graph: LinearGraph, outputs: Sequence[str] = ()) -> Structure:
         builder.storage_values,
         frozenset(at for at, branch in enumerate(graph.branches) if branch.is_stiffness),
         tuple(wanted), tuple(builder.arguments))
+
+
+def check_asked(structure: Structure) -> None:
+    """
+    Check that there is anything to derive.
+
+    Raises
+    ------
+    GraphError
+        If there is neither a state nor an output.
+    """
+    if not structure.states and not structure.outputs:
+        raise GraphError('the graph has no state: it needs an A-type or a T-type whose variable '
+                         'is not fixed by sources and two-ports alone, or outputs to derive')
 
 
 def _secondary(graph: LinearGraph, in_tree: tuple[bool, ...]) -> FloatArray:

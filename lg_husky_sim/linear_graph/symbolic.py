@@ -13,7 +13,7 @@ from lg_husky_sim.linear_graph.checks import check_symbols
 from lg_husky_sim.linear_graph.graph import LinearGraph, Variable
 from lg_husky_sim.linear_graph.numeric import NumericModel
 from lg_husky_sim.linear_graph.rational import add_scaled, RationalField, Row, solve
-from lg_husky_sim.linear_graph.structure import analyse, Structure
+from lg_husky_sim.linear_graph.structure import analyse, check_asked, Structure
 import numpy as np
 
 if TYPE_CHECKING:
@@ -116,6 +116,7 @@ def derive(graph: LinearGraph, outputs: Sequence[str] = (), *,
     if by_element:
         check_symbols(graph)
     structure = analyse(graph, outputs)
+    check_asked(structure)
     NumericModel(structure, chained=True)     # refuses loops through non-linear laws
     texts = [value.owner if by_element and value.rule != 'any' else value.text
              for value in structure.values]

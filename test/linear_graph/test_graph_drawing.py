@@ -107,8 +107,15 @@ def test_files_are_written_whole_and_the_same_again(
 def test_wrong_endings_and_folders_are_named(husky: LinearGraph, tmp_path: Path) -> None:
     with pytest.raises(GraphError, match=r"picture '.*g.gif' must end in .svg, .png, .pdf"):
         save_picture(husky, tmp_path / 'g.gif')
-    with pytest.raises(FileNotFoundError):
-        save_picture(husky, tmp_path / 'none' / 'g.svg')
+    (tmp_path / 'file').touch()
+    with pytest.raises(OSError, match=r"exists: '.*/file'$"):
+        save_picture(husky, tmp_path / 'file' / 'g.svg')
+
+
+def test_a_folder_that_is_missing_is_made_as_exports_make_it(
+        husky: LinearGraph, tmp_path: Path) -> None:
+    assert save_picture(husky, tmp_path / 'new' / 'one' / 'g.svg').exists()
+    assert [path.name for path in (tmp_path / 'new' / 'one').iterdir()] == ['g.svg']
 
 
 def test_dollar_signs_are_plain_text(tmp_path: Path) -> None:

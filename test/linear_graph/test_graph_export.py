@@ -127,3 +127,102 @@ def test_laws_that_are_not_linear_are_named_where_they_are_left_out(tmp_path: Pa
 def test_an_unknown_ending_lists_those_there_are(space: StateSpace, tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r'must be one of \.json, \.mat'):
         export(space, tmp_path / 'model.xlsx')
+
+
+RATE = """
+name: two capacitors /* in series */
+elements:
+  V_s: {is: voltage source, from: a}
+  C_1: {is: capacitor, from: a, to: b, value: 1 F}
+  C_2: {is: capacitor, from: b, value: 1 F}
+  R:   {is: resistor, from: b, value: 1 Ω}
+outputs: [V(C_2)]
+"""
+RAM = """
+elements:
+  F_s: {is: force source, from: ground, to: a}
+  m:   {is: mass, from: a, value: 1 kg}
+  ram: {is: gyrator, value: 2, port 1: {domain: translational, from: a},
+        port 2: {domain: fluid, from: b}}
+  R:   {is: valve, from: b, value: 1 Pa·s/m³}
+outputs: [Q(ram.2), F(ram.1)]
+"""
+FREE = 'elements:\n  R: {is: resistor, from: a, value: 1}\n  C: {is: capacitor, from: a, value: 1}'
+STATIC = """
+elements:
+  V_s: {is: voltage source, from: a}
+  R_1: {is: resistor, from: a, to: b, value: 1 Ω}
+  R_2: {is: resistor, from: b, value: 3 Ω}
+outputs: [V(R_2)]
+"""
+
+
+def test_states_less_their_share_of_an_input_are_called_so(tmp_path: Path) -> None:
+    """C_2's share in E is a half: the state is V(C_1) - V_s/2, and V(C_2) = V_s/2 - x."""
+    graph = lg.graph(RATE)
+    system = graph.to_control()
+    assert system.state_labels == ['V(C_1) - E u']
+    assert (system.C.item(), system.D.item()) == (-1.0, 0.5)
+    for ending in ('h', 'tex', 'py'):
+        text = graph.export(tmp_path / f'one.{ending}').read_text('utf-8')
+        assert 'V(C_1) - E u = V(C_1) - 0.5 V_s' in text, ending
+    assert runpy.run_path(str(tmp_path / 'one.py'))['states'] == ['V(C_1) - E u']
+    assert json.loads(graph.export(tmp_path / 'one.json').read_text('utf-8'))['states'] == [
+        'V(C_1)']
+
+
+def test_ports_have_names_that_control_takes(tmp_path: Path) -> None:
+    graph = lg.graph(RAM)
+    written = runpy.run_path(str(graph.export(tmp_path / 'ram.py')))['control_system']()
+    for system in (graph.to_control(), written):
+        assert system.output_labels == ['Q(ram_2)', 'F(ram_1)']
+        assert np.array_equal(system.C, graph.numeric().C)
+
+
+@pytest.mark.parametrize(('text', 'sizes'), [
+    (RATE.replace('outputs: [V(C_2)]', ''), (1, 1, 0)), (FREE, (1, 0, 0)),
+    (f'{FREE}\noutputs: [V(C)]', (1, 0, 1)), (STATIC, (0, 1, 1))])
+def test_models_without_states_inputs_or_outputs_are_exported(
+        text: str, sizes: tuple[int, int, int], tmp_path: Path) -> None:
+    graph = lg.graph(text)
+    n, m, p = sizes
+    written = runpy.run_path(str(graph.export(tmp_path / 'one.py')))
+    for system in (graph.to_control(), written['control_system']()):
+        assert (system.nstates, system.ninputs, system.noutputs) == (n, m or 1, p)
+        assert system.input_labels == (['none'] if m == 0 else list(graph.inputs))
+    assert graph.to_scipy().D.shape == (p, m)
+    assert written['scipy_system']().A.shape == (n, n)
+    header = graph.export(tmp_path / 'one.h').read_text('utf-8')
+    assert set(c_matrices(header)) == {
+        name for name, size in zip(NAMES, (n, n * m, p * n, p * m), strict=True) if size}
+    assert '[0]' not in header
+    assert (f'STATES {n}\n' in header, f'OUTPUTS {p}\n' in header) == (True, True)
+    assert r'\begin{bmatrix}' + '\n\n' not in graph.export(tmp_path / 'one.tex').read_text('utf-8')
+
+
+def test_headers_are_iso_c_whatever_the_title_is(tmp_path: Path) -> None:
+    path = lg.graph(RATE.replace('/* in', '*/ /* /*/ in').replace(
+        'outputs: [V(C_2)]', '')).export(tmp_path / 'one.h')
+    first, comment, *_ = re.split(r'/\*|\*/', path.read_text('utf-8'))
+    assert (first, comment.count('two capacitors')) == ('', 1)
+    if compiler := shutil.which('cc'):
+        (tmp_path / 'use.c').write_text(
+            '#include "one.h"\nint main(void) { return lg_husky_A[0][0] > lg_husky_B[0][0]; }\n')
+        subprocess.run([compiler, '-std=c99', '-pedantic-errors', '-Wall', '-Werror', '-o', 'use',
+                        'use.c'], cwd=tmp_path, check=True, timeout=60)
+
+
+def test_a_static_graph_has_d_and_f_alone() -> None:
+    graph = lg.graph(STATIC)
+    assert str(graph.D) == 'Matrix([[R_2/(R_1 + R_2)]])'
+    assert graph.numeric().D.tolist() == [[0.75]]
+    assert graph.numeric().poles.tolist() == []
+    assert repr(graph) == '<Graph graph: 3 branches; y = D u>'
+    assert 'none, it has no state' in graph.text()
+    charged = lg.graph("""
+        elements:
+          V_s: {is: voltage source, from: a}
+          C:   {is: capacitor, from: a, value: 2}
+        outputs: [i(C)]
+        """)
+    assert (charged.states, charged.numeric().F.tolist()) == ((), [[2.0]])
