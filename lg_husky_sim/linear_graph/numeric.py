@@ -193,7 +193,7 @@ class NumericModel:
             coupling, drive = self._gather @ coupling, self._gather @ drive
         matrix = self._identity - coupling
         try:
-            solved: FloatArray = np.linalg.solve(matrix, drive)
+            solved = np.asarray(np.linalg.solve(matrix, drive), dtype=np.float64)
         except np.linalg.LinAlgError as error:
             raise self._singular(matrix, raw) from error
         if is_rounding(matrix, drive, solved):

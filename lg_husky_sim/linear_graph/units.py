@@ -12,6 +12,7 @@ import ast
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+import math
 import re
 
 from lg_husky_sim.errors import GraphError
@@ -46,11 +47,17 @@ _UNITS: Mapping[str, tuple[float, Dimension]] = {
     'V': (1.0, _dimension(1, 2, -3, -1, 0)), 'C': (1.0, _dimension(0, 0, 1, 1, 0)),
     'ohm': (1.0, _dimension(1, 2, -3, -2, 0)), 'S': (1.0, _dimension(-1, -2, 3, 2, 0)),
     'H': (1.0, _dimension(1, 2, -2, -2, 0)), 'F': (1.0, _dimension(-1, -2, 4, 2, 0)),
-    'Wb': (1.0, _dimension(1, 2, -2, -1, 0)), 'T': (1.0, _dimension(1, 0, -2, -1, 0))}
+    'Wb': (1.0, _dimension(1, 2, -2, -1, 0)), 'T': (1.0, _dimension(1, 0, -2, -1, 0)),
+    'L': (1e-3, _dimension(0, 3, 0, 0, 0)), 'l': (1e-3, _dimension(0, 3, 0, 0, 0)),
+    'bar': (1e5, _dimension(1, -1, -2, 0, 0))}
+_NO_PREFIX: Mapping[str, tuple[float, Dimension]] = {
+    'min': (60.0, _dimension(0, 0, 1, 0, 0)), 'h': (3600.0, _dimension(0, 0, 1, 0, 0)),
+    'deg': (math.pi / 180.0, PURE), 'rpm': (math.pi / 30.0, _dimension(0, 0, -1, 0, 0)),
+    'degC': (1.0, _dimension(0, 0, 0, 0, 1))}
 _PREFIXES = {'p': 1e-12, 'n': 1e-9, 'u': 1e-6, 'm': 1e-3, 'c': 1e-2, 'k': 1e3, 'M': 1e6,
              'G': 1e9}
 _ALIASES = {'\u03a9': 'ohm', '\u2126': 'ohm',
-            'Ohm': 'ohm', 'µ': 'u', 'μ': 'u', '²': '**2', '³': '**3',
+            'Ohm': 'ohm', '°C': 'degC', '°': 'deg', 'µ': 'u', 'μ': 'u', '²': '**2', '³': '**3',
             '⁻¹': '**-1', '·': '*', '⋅': '*', '×': '*', '^': '**', '−': '-'}
 
 _ACROSS_UNIT = {Domain.ELECTRICAL: 'V', Domain.TRANSLATIONAL: 'm/s', Domain.ROTATIONAL: 'rad/s',
@@ -101,6 +108,9 @@ def parse_unit(text: str) -> Unit:
     for alias, replacement in _ALIASES.items():
         plain = plain.replace(alias, replacement)
     plain = re.sub(r'(?<=[\w)])\s+(?=[\w(])', '*', plain)
+    if plain == 'degC':
+        raise GraphError(f'unit {shown}: temperatures are given from absolute zero or as '
+                         'differences; write K')
     try:
         tree = parse(plain)
     except GraphError as error:
@@ -111,14 +121,14 @@ def parse_unit(text: str) -> Unit:
 
 def _unit_of(node: ast.expr, shown: str) -> tuple[float, Dimension]:
     if isinstance(node, ast.Name):
-        if node.id in _UNITS:
-            return _UNITS[node.id]
-        prefix, unit = node.id[:1], node.id[1:]
-        if prefix in _PREFIXES and unit in _UNITS and unit != '1':
-            scale, dimension = _UNITS[unit]
-            return _PREFIXES[prefix] * scale, dimension
+        if (found := _named(node.id)) is not None:
+            return found
+        if meant := _meant(node.id):
+            raise GraphError(f'unit {shown}: {node.id!r} is not a known unit; did you mean '
+                             f'{meant!r}?')
         raise GraphError(f'unit {shown}: {node.id!r} is not a known unit; known are '
-                         f'{", ".join(_UNITS)} with the prefixes {", ".join(_PREFIXES)}')
+                         f'{", ".join(_UNITS)} with the prefixes {", ".join(_PREFIXES)}, and '
+                         f'{", ".join(_NO_PREFIX)}')
     if number_of(node) == 1.0:
         return 1.0, PURE
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
@@ -131,6 +141,34 @@ def _unit_of(node: ast.expr, shown: str) -> tuple[float, Dimension]:
         power = Fraction(number_of(node.right) or 0.0).limit_denominator(12)
         return scale ** float(power), tuple(a * power for a in dimension)
     raise GraphError(f"unit {shown} cannot be read; write it like 'N·m·s/rad'")
+
+
+def _named(name: str) -> tuple[float, Dimension] | None:
+    if name in _UNITS or name in _NO_PREFIX:
+        return _UNITS.get(name) or _NO_PREFIX[name]
+    prefix, unit = name[:1], name[1:]
+    if prefix in _PREFIXES and unit in _UNITS and unit != '1':
+        scale, dimension = _UNITS[unit]
+        return _PREFIXES[prefix] * scale, dimension
+    return None
+
+
+def _meant(name: str) -> str:
+    """Return a unit that may be meant: a product without its dot, or other capitals."""
+    capitals = [name[0].lower() + name[1:], name[0] + name[1:].upper(), name[0].upper() + name[1:]]
+    products = [_product(name, plain=True), _product(name, plain=False)]
+    order = [*capitals, *products] if name[0] == 'K' else [products[0], *capitals, products[1]]
+    return next((text for text in order if '·' in text or (text and _named(text))), '')
+
+
+def _product(name: str, plain: bool) -> str:
+    if name in _UNITS or (not plain and _named(name) is not None):
+        return name
+    for at in range(len(name) - 1, 0, -1):
+        head, tail = name[:at], _product(name[at:], plain)
+        if tail and (head in _UNITS or (not plain and _named(head) is not None)):
+            return f'{head}·{tail}'
+    return ''
 
 
 def unit_needed(element: Branch | TwoPort) -> str:

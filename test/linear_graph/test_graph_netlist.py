@@ -90,7 +90,7 @@ def test_forms_and_grounds() -> None:
     ('0.5 ohm', '0.5*', r"branch 'R': expression '0.5\*' cannot be read"),
     ('value: 0.5', 'valeu: 0.5', r"element 'R': unknown key 'valeu'; did you mean 'value'"),
     ('from: motor}', 'from: motr}', r"node 'motor' has no branch but 'L'|node 'motr' has"),
-    ('0.5 ohm', '0.5 bar', r"element 'R': unit 'bar': 'bar' is not a known unit"),
+    ('0.5 ohm', '0.5 psi', r"element 'R': unit 'psi': 'psi' is not a known unit"),
     ('0.5 ohm', '[1, 2]', r"element 'R': value must be a number with a unit"),
     ('0.5 ohm', '.inf', r"element 'R': value = inf must be a number with a unit"),
     ('  J:', '  R:', r'not YAML: R is given twice in line \d+'),

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from math import pi
+
 from lg_husky_sim.errors import GraphError
 from lg_husky_sim.husky import network
 from lg_husky_sim.linear_graph import (
@@ -38,7 +40,9 @@ def test_two_ways_to_write_one_unit(one: str, other: str) -> None:
 
 @pytest.mark.parametrize(('text', 'scale'), [
     ('mH', 1e-3), ('µF', 1e-6), ('kN/m', 1e3), ('g·cm²', 1e-7), ('kPa·s/m³', 1e3), ('mm', 1e-3),
-    ('MPa', 1e6), ('1/ms', 1e3),
+    ('MPa', 1e6), ('1/ms', 1e3), ('mL', 1e-6), ('mbar', 100.0), ('L/min', 1e-3 / 60.0),
+    ('V/rpm', 30.0 / pi), ('deg/s', pi / 180.0), ('°', pi / 180.0), ('A·h', 3600.0),
+    ('W/°C', 1.0),
 ])
 def test_prefixes_scale(text: str, scale: float) -> None:
     assert parse_unit(text).scale == pytest.approx(scale, rel=1e-12)
@@ -50,6 +54,25 @@ def test_prefixes_scale(text: str, scale: float) -> None:
 def test_what_is_no_unit_is_refused(text: str) -> None:
     with pytest.raises(GraphError, match='unit'):
         parse_unit(text)
+
+
+@pytest.mark.parametrize(('text', 'meant'), [
+    ('Nm', 'N·m'), ('Nms/rad', 'N·m·s'), ('KΩ', 'kohm'), ('Kg', 'kg'), ('mh', 'mH'),
+    ('kw', 'kW'), ('kgm²', 'kg·m')])
+def test_a_unit_that_may_be_meant_is_suggested(text: str, meant: str) -> None:
+    with pytest.raises(GraphError, match=f"is not a known unit; did you mean '{meant}'"):
+        parse_unit(text)
+
+
+@pytest.mark.parametrize('text', ['mmin', 'krpm', 'kdeg'])
+def test_units_beside_the_si_have_no_prefixes(text: str) -> None:
+    with pytest.raises(GraphError, match='is not a known unit'):
+        parse_unit(text)
+
+
+def test_temperatures_have_their_zero_in_kelvin() -> None:
+    with pytest.raises(GraphError, match=r"unit '°C': temperatures are given from absolute zero"):
+        parse_unit('°C')
 
 
 @pytest.mark.parametrize('make', [network.simplified, network.expanded])
