@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from lg_husky_sim.api.responses import Responses
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.errors import GraphError, LgHuskyError, ParameterError
 from lg_husky_sim.linear_graph import (
@@ -24,7 +25,7 @@ from lg_husky_sim.linear_graph import (
 from lg_husky_sim.linear_graph.netlist import netlist_of, parse_netlist, read_netlist
 
 
-class Graph:
+class Graph(Responses):
     """
     A linear graph and the state-space model that follows from it.
 
