@@ -110,7 +110,9 @@ def test_a_sensor_that_falls_silent_before_the_commands_is_named(drive: lg.Recor
 def test_a_drive_faster_than_any_husky_is_named() -> None:
     times = np.arange(0.0, 15.0, 0.05)
     fast = lg.Husky().simulate((times, 3.0 + 0.0 * times, 0.0 * times))
-    assert any('faster than any Husky drives' in one for one in fast.info().warnings)
+    assert any('whole supply at 1.12 m/s' in one for one in fast.info().warnings)
+    faster = lg.Husky(command_gain=0.4)
+    assert not any('whole supply' in one for one in fast.info(faster).warnings)
 
 
 def test_each_limit_has_unit_meaning_and_source() -> None:

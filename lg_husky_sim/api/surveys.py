@@ -242,8 +242,10 @@ def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relati
             'in a model file of its own'))
     fastest = max((float(np.abs(series.column('forward')).max()) for name, series in
                    recording.streams.items() if name == 'command' and len(series)), default=0.0)
-    if fastest > limits()['fastest_husky']:
-        said.append(f'{fastest:.2f} m/s are commanded, faster than any Husky drives (1.0 m/s)')
+    most = 1.0 / husky.parameters['command_gain']
+    if fastest > limits()['overdriven'] * most:
+        said.append(f'{fastest:.2f} m/s are commanded, but the model has its whole supply at '
+                    f'{most:.2f} m/s (1/command_gain): it may be of another robot')
     said += _silences(recording)
     return tuple(said)
 

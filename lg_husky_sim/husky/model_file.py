@@ -256,7 +256,9 @@ def apply_settings(model: ModelFile, settings: Mapping[str, float]) -> ModelFile
     ParameterError
         If a name is unknown or a value out of bounds.
     """
-    return ModelFile(model.structure, model.parameters.replacing(settings), model.about)
+    parameters = model.parameters.replacing(settings)
+    return ModelFile(model.structure, parameters.with_entries(*(
+        replace(parameters.entry(name), source='set by hand') for name in settings)), model.about)
 
 
 def parse_settings(pairs: tuple[str, ...]) -> dict[str, float]:
