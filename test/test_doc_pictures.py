@@ -28,9 +28,9 @@ PICTURES = DOCS / 'pictures'
 BLOCK, ALIKE = 16, 30.0
 #: Files of outcomes that the page of the blind trial is made of: the report of today, the exams,
 #: earlier reports.
+REPORTS = sorted((path.stem for path in DOCS.glob('proof_report_*.jsonl')), reverse=True)
 OUTCOMES = ('proof_report', 'proof_exam', 'proof_exam_2', 'proof_exam_3', 'proof_exam_4',
-            'proof_exam_5', *sorted((
-    path.stem for path in DOCS.glob('proof_report_*.jsonl')), reverse=True), 'proof_validation')
+            'proof_exam_5', *REPORTS, 'proof_validation')
 
 
 def blocks(path: Path) -> FloatArray:
