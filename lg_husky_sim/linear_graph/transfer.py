@@ -154,12 +154,21 @@ def frequency_response(space: StateSpace, rates: ArrayLike, output: int, source:
     Returns
     -------
     numpy.ndarray of complex, shape (k,)
+
+    Raises
+    ------
+    ParameterError
+        If there is a pole at one of them.
     """
     found = []
     for rate in np.atleast_1d(np.asarray(rates, dtype=np.float64)):
         s = 1j * rate
         drive = space.B[:, source] + s * space.E[:, source]
-        state = np.linalg.solve(s * np.eye(len(space.states)) - space.A, drive)
+        try:
+            state = np.linalg.solve(s * np.eye(len(space.states)) - space.A, drive)
+        except np.linalg.LinAlgError as error:
+            raise ParameterError(f'there is a pole at {rate:g} rad/s; choose another angular '
+                                 'frequency') from error
         found.append(space.C[output] @ state + space.D[output, source]
                      + s * space.F[output, source])
     return np.array(found, dtype=np.complex128)

@@ -27,6 +27,12 @@ elements:
   R:   {is: resistor, from: b, value: 2}
 outputs: [V(C_2)]
 """
+MASS = """
+elements:
+  F: {is: force source, from: ground, to: m}
+  M: {is: mass, from: m, value: 2}
+outputs: [v(M)]
+"""
 
 
 def symbols(text: str) -> dict[str, sympy.Symbol]:
@@ -113,3 +119,5 @@ def test_what_cannot_be_answered_is_said() -> None:
         lg.graph(DIVIDER, outputs=['i(C_2)']).step([0.0, 1.0])
     with pytest.raises(GraphError, match="an element is called 's'"):
         lg.graph(LEAD.replace('C: ', 's: ')).transfer_function()
+    with pytest.raises(ParameterError, match='there is a pole at 0 rad/s'):
+        lg.graph(MASS).bode([1.0, 0.0])
