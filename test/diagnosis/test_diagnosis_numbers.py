@@ -75,3 +75,10 @@ def test_only_listed_modules_name_an_effect(module: str) -> None:
              if isinstance(c, ast.Constant) and isinstance(c.value, str)
              and c.value in catalogue()}
     assert named <= NAMED.get(module, set())
+
+
+def test_the_largest_payload_stands_in_the_documentation() -> None:
+    text = (ROOT / 'docs' / 'diagnosis.md').read_text(encoding='utf-8')
+    said = re.search(r'`largest_load`: (\d+) kg on a Husky', text)
+    assert said is not None
+    assert float(said[1]) == setting('largest_load')
