@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from lg_husky_sim.api.identifying import Fit
     from lg_husky_sim.api.lists import list_effects, list_manoeuvres
     from lg_husky_sim.api.recordings import read, read_all, Recording
-    from lg_husky_sim.api.robots import Husky
+    from lg_husky_sim.api.robots import Husky, Number
     from lg_husky_sim.api.surveys import Survey
     from lg_husky_sim.errors import LgHuskyError
 
@@ -36,6 +36,7 @@ __all__ = [
     'Graph',
     'Husky',
     'LgHuskyError',
+    'Number',
     'Recording',
     'Survey',
     '__version__',
@@ -54,6 +55,7 @@ _HOMES = {
     'Graph': 'api.graphs',
     'Husky': 'api.robots',
     'LgHuskyError': 'errors',
+    'Number': 'api.robots',
     'Recording': 'api.recordings',
     'Survey': 'api.surveys',
     'compare': 'api.comparing',

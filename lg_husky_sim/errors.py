@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+#: Between the lines of a message that lists several errors; any other message is one line.
+SEVERAL = '\n  '
+
 
 class LgHuskyError(Exception):
     """Base of every error raised on purpose by this package."""

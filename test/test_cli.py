@@ -51,6 +51,8 @@ def verb_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
         def command(how):
             if how == 'ours':
                 raise ParameterError('mass = -1 kg is below\\nits lower bound 0')
+            if how == 'several':
+                raise ParameterError('2 errors\\n  mass is missing\\n  track is missing')
             if how == 'file':
                 open('/nonexistent/file')
             if how == 'interrupt':
@@ -68,6 +70,7 @@ def verb_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 @pytest.mark.parametrize(('how', 'code', 'said'), [
     ('ours', 1, 'error: mass = -1 kg is below its lower bound 0\n'),
+    ('several', 1, 'error: 2 errors\n  mass is missing\n  track is missing\n'),
     ('file', 1, 'error: /nonexistent/file: No such file or directory\n'),
     ('interrupt', 130, 'interrupted\n'),
     ('well', 0, ''),

@@ -154,7 +154,8 @@ BROKEN: list[tuple[str, str, Callable[[Any], None], str]] = [
     ('model', HUSKY, lambda d: d.update(effects=[
         {'effect': 'slope', 'parameters': {'steep': 1.0}}]), "'steep' was unexpected"),
     ('model', HUSKY, lambda d: d.update(effects=[
-        {'effect': 'slope', 'parameters': {'slope_x': 1e6}}]), 'effects/0/parameters/slope_x: '),
+        {'effect': 'command_latency', 'parameters': {'latency': 9.0}}]),
+     'effects/0/parameters/latency: '),
     ('commands', SCRIPT, lambda d: d['steps'][1].pop('duration'),
      "'duration' is a required property"),
     ('commands', SCRIPT, lambda d: d['steps'][0].update(speed=1.0), "'speed' was unexpected"),

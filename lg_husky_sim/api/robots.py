@@ -8,20 +8,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import overload, TYPE_CHECKING
 
 from lg_husky_sim.api.driving import Drive, driven
 from lg_husky_sim.api.graphs import Graph
 from lg_husky_sim.api.progress import Shown
 from lg_husky_sim.api.recordings import PathLike, Recording, Recordings, Topics
 from lg_husky_sim.api.tables import page_part, Table
+from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky import network
+from lg_husky_sim.husky.by_hand import Number as Number  # a public name, used here too
 from lg_husky_sim.husky.effects import check_distinct, Effect, Subsystem
 from lg_husky_sim.husky.model import compile_model, Structure
 from lg_husky_sim.husky.model_file import apply_settings, load_model, ModelFile, save_model
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.linear_graph import LinearGraph
+from lg_husky_sim.yaml_files import shown
 
 if TYPE_CHECKING:
     from lg_husky_sim.api.comparing import Comparison
@@ -31,15 +34,18 @@ if TYPE_CHECKING:
 
 class Husky(Graph):
     """
-    A model of the Clearpath Husky.
+    A model of the Clearpath Husky, or of another skid-steer robot with other numbers.
 
     Parameters
     ----------
     model : path-like, ModelFile or Husky, optional
         A model file such as ``identify`` and ``diagnose`` write; the packaged Husky with the
         paper's parameters by default.
-    **settings : float
-        Physical parameters by name, in place of the model's [SI].
+    about : str, optional
+        One line on which robot it is; by default what the model says, and what is set by hand.
+    **settings : float or Number
+        Physical parameters by name, in place of the model's [SI]; a :class:`Number` says how
+        well one is known, too. Bounds stay in proportion to the robot's size.
 
     Raises
     ------
@@ -52,8 +58,17 @@ class Husky(Graph):
     path: str
     model: ModelFile
 
-    def __init__(self, model: PathLike | ModelFile | Husky | None = None, **settings: float
-                 ) -> None:
+    # Two, so that a mapping of floats can be given as ``**settings`` and is checked as such.
+    @overload
+    def __init__(self, model: PathLike | ModelFile | Husky | None = None,
+                 **settings: float | Number) -> None: ...
+
+    @overload
+    def __init__(self, model: PathLike | ModelFile | Husky | None = None, *,
+                 about: str | None, **settings: float | Number) -> None: ...
+
+    def __init__(self, model: PathLike | ModelFile | Husky | None = None, *,
+                 about: str | float | Number | None = None, **settings: float | Number) -> None:
         """Read the model; the equations are derived when they are first needed."""
         if isinstance(model, Husky):
             file, self.path = model.model, model.path
@@ -61,9 +76,11 @@ class Husky(Graph):
             file, self.path = model, ''
         else:
             file, self.path = load_model(model), '' if model is None else os.fspath(model)
-        self.model = apply_settings(file, settings)
+        if not (about is None or isinstance(about, str)):
+            raise ParameterError(f'about = {shown(about)} is not a text')
+        self.model = apply_settings(file, settings, about)
         linear = file.structure.network().graph
-        name = file.about or (Path(self.path).stem if self.path else 'Husky')
+        name = self.model.about or (Path(self.path).stem if self.path else 'Husky')
         super().__init__(name, linear, _values(self.model), paper_outputs(linear),
                          _note(file.structure))
 
@@ -82,9 +99,16 @@ class Husky(Graph):
         """The model ready to be stepped."""
         return compile_model(self.model.structure).at(self.model.parameters)
 
-    def replacing(self, **values: float) -> Husky:
-        """Return this model with other values of parameters [SI]."""
-        return Husky(self.model, **values)
+    @overload
+    def replacing(self, **values: float | Number) -> Husky: ...
+
+    @overload
+    def replacing(self, *, about: str | None, **values: float | Number) -> Husky: ...
+
+    def replacing(self, *, about: str | float | Number | None = None, **values: float | Number
+                  ) -> Husky:
+        """Return this model with other values of parameters [SI], as ``Husky(...)`` takes them."""
+        return Husky(self.model, about=about, **values)
 
     def with_effect(self, effect: str, side: str = '', shape: str = '', **values: float) -> Husky:
         """

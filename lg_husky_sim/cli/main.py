@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 from lg_husky_sim.blas import set_one_thread
-from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.errors import LgHuskyError, SEVERAL
 
 MISUSED = 2
 """Exit code after a command line that cannot be understood, as shells expect it."""
@@ -140,8 +140,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 
 def fail(message: str, code: int = 1) -> int:
-    """Print the message as one line on standard error; return the exit code."""
-    head, colon, rest = ' '.join(message.split()).partition(':')
+    """Print the message on standard error, in one line for each error; return the exit code."""
+    lines = [' '.join(line.split()) for line in message.split(SEVERAL)]
+    head, colon, rest = SEVERAL.join(lines).partition(':')
     # click drops the colour where it is no terminal, or NO_COLOR is set.
     colour = 'red' if colon and 'NO_COLOR' not in os.environ else None
     click.echo(click.style(head + colon, fg=colour) + rest, err=True)

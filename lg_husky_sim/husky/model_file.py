@@ -4,22 +4,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-import math
 import os
 from pathlib import Path
 import tempfile
-from typing import Any
 
 from lg_husky_sim.errors import LgHuskyError, ModelFileError, ParameterError
-from lg_husky_sim.husky.effects import check_distinct, Effect, Onset, OnsetKind
-from lg_husky_sim.husky.model import Drivetrain, Structure
-from lg_husky_sim.husky.model_schema import EFFECT, ONSET, PARAMETER, SCHEMA, STRUCTURE, TOP
+from lg_husky_sim.husky.by_hand import about_of, Number, with_numbers
+from lg_husky_sim.husky.model import Structure
+from lg_husky_sim.husky.model_reader import read_model
+from lg_husky_sim.husky.model_schema import SCHEMA
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.husky.robot_size import size_of
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.yaml_files import read_yaml, shown, yaml_text
+
+#: What else `Husky(...)` takes by name, so that no parameter is called so.
+RESERVED = ('self', 'model', 'about')
 
 PAPER = 'paper'
 """Name of the packaged model where a file is asked for."""
@@ -55,110 +57,7 @@ def default_model_path() -> Path:
     return config_path('husky.yaml')
 
 
-def _number(name: str, key: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ModelFileError(f'{name}: {key} = {shown(value)} is not a number')
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise ModelFileError(f'{name}: {key} = {shown(value)} is not finite')
-    return number
-
-
-def _text(what: str, value: object) -> str:
-    # A key without a value is an empty text.
-    if isinstance(value, (dict, list)):
-        raise ModelFileError(f'{what} = {shown(value)} is not a text')
-    return '' if value is None else str(value)
-
-
-def _mapping(what: str, value: object) -> dict[str, Any]:
-    if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
-        raise ModelFileError(f'{what} is not a mapping of names')
-    return value
-
-
-def _parameter(name: str, entry: object) -> Parameter:
-    data = _mapping(f'parameter {name}', entry)
-    keys = PARAMETER['properties']
-    unknown = sorted(set(data) - set(keys))
-    if unknown:
-        raise ModelFileError(
-            f'parameter {name}: unknown key {shown(unknown[0])} '
-            f'(allowed: {", ".join(sorted(keys))})')
-    for key in PARAMETER['required']:
-        if key not in data:
-            raise ModelFileError(f'parameter {name}: {key} is missing')
-    free = data.get('free', False)
-    if not isinstance(free, bool):
-        raise ModelFileError(f'parameter {name}: free = {shown(free)} is neither true nor false')
-    interval = [None if data.get(key) is None else _number(name, key, data[key])
-                for key in ('low', 'high')]
-    return Parameter(
-        name, _number(name, 'value', data['value']), _text(f'{name}: unit', data['unit']),
-        _number(name, 'lower', data['lower']), _number(name, 'upper', data['upper']),
-        _text(f'{name}: source', data['source']),
-        _number(name, 'tolerance', data.get('tolerance', 0.0)), free, *interval)
-
-
-def _effect(index: int, entry: object, shared: set[str]
-            ) -> tuple[Effect, tuple[Parameter, ...]]:
-    data = _mapping(f'effect {index + 1}', entry)
-    unknown = sorted(set(data) - set(EFFECT['properties']))
-    if unknown:
-        raise ModelFileError(f'effect {index + 1}: unknown key {shown(unknown[0])}')
-    flags = {name: data.get(name, False) for name in ('late', 'again')}
-    for name, flag in flags.items():
-        if not isinstance(flag, bool):
-            raise ModelFileError(
-                f'effect {index + 1}: {name} = {shown(flag)} is neither true nor false')
-    name, side, shape = (_text(f'effect {index + 1}: {key}', data.get(key))
-                         for key in ('effect', 'side', 'shape'))
-    effect = Effect(name, side, shape, **flags)
-    given = _mapping(f'effect {effect.id}: parameters', data.get('parameters', {}))
-    known = {p.name: p for p in effect.parameters()}
-    parameters = []
-    for name in given:
-        if name not in known:
-            raise ModelFileError(f'effect {effect.id}: unknown parameter {shown(name)} '
-                                 f'(known: {", ".join(known)})')
-    for name, template in known.items():
-        if name not in given:
-            if name not in shared:
-                parameters.append(template.parameter())
-        elif isinstance(given[name], dict):
-            parameters.append(_parameter(name, given[name]))
-        else:
-            parameters.append(template.parameter(_number(name, 'value', given[name])))
-    return effect, tuple(parameters)
-
-
-def _refuse_others(where: str, entry: Mapping[str, object], allowed: Sequence[str]) -> None:
-    other = next((key for key in entry if key not in allowed), None)
-    if other is not None:
-        raise ModelFileError(f'{where}: unknown key {shown(other)} (known: {", ".join(allowed)})')
-
-
-def _onset(data: object) -> Onset | None:
-    if data is None:
-        return None
-    entry = _mapping('structure.onset', data)
-    _refuse_others('structure.onset', entry, tuple(ONSET['properties']))
-    kinds = [kind.value for kind in OnsetKind]
-    if entry.get('kind') not in kinds:
-        raise ModelFileError(
-            f'structure.onset.kind = {shown(entry.get("kind"))} is not one of {", ".join(kinds)}')
-    earlier = [] if entry.get('earlier') is None else entry['earlier']
-    if not isinstance(earlier, list) or not all(isinstance(name, str) for name in earlier):
-        raise ModelFileError('structure.onset.earlier is not a list of names of recordings')
-    return Onset(OnsetKind(entry['kind']), _number('structure.onset', 'value',
-                                                   entry.get('value')),
-                 _text('structure.onset.recording', entry.get('recording')), tuple(earlier))
-
-
-def model_from_data(data: object, name: str) -> ModelFile:
+def model_from_data(data: object, name: str, *, packaged: bool = False) -> ModelFile:
     """
     Read a model out of parsed YAML.
 
@@ -168,6 +67,8 @@ def model_from_data(data: object, name: str) -> ModelFile:
         As ``yaml.safe_load`` gives it.
     name : str
         What to call it in messages.
+    packaged : bool
+        Whether it is the packaged robot, of which every key must be told.
 
     Returns
     -------
@@ -176,39 +77,11 @@ def model_from_data(data: object, name: str) -> ModelFile:
     Raises
     ------
     ModelFileError
-        If something is missing, unknown or of the wrong type.
+        If something is missing, unknown or of the wrong type: all of it, a line each.
     """
+    nominal = None if packaged else load_model(default_model_path()).parameters
     try:
-        content = _mapping('the file', data)
-        if content.get('schema') != SCHEMA:
-            raise ModelFileError(f'schema is {shown(content.get("schema"))}, expected {SCHEMA!r}')
-        unknown = sorted(set(content) - set(TOP['properties']))
-        if unknown:
-            raise ModelFileError(f'unknown key {shown(unknown[0])}')
-        structure = _mapping('structure', content.get('structure', {}))
-        _refuse_others('structure', structure, tuple(STRUCTURE['properties']))
-        drivetrains = [d.value for d in Drivetrain]
-        drivetrain = structure.get('drivetrain', 'simplified')
-        if drivetrain not in drivetrains:
-            raise ModelFileError(f'structure.drivetrain = {shown(drivetrain)} is not one of '
-                                 f'{", ".join(drivetrains)}')
-        entries = [_parameter(key, entry) for key, entry in _mapping(
-            'parameters', content.get('parameters')).items()]
-        listed = [] if content.get('effects') is None else content['effects']
-        if not isinstance(listed, list):
-            raise ModelFileError('effects is not a list')
-        shared = {p.name for p in entries}
-        effects = [_effect(i, entry, shared) for i, entry in enumerate(listed)]
-        check_distinct(effect for effect, _ in effects)
-        shape = Structure(Drivetrain(drivetrain), tuple(effect for effect, _ in effects),
-                          _onset(structure.get('onset')))
-        parameters = Parameters(tuple(entries)).with_entries(
-            *(p for _, group in effects for p in group))
-        nominal = () if name == 'husky.yaml' else packaged_parameters()
-        missing = [p for p in nominal if p not in parameters]
-        if missing:
-            raise ModelFileError(f'parameter {missing[0]} is missing')
-        return ModelFile(shape, parameters, _text('about', content.get('about')))
+        return ModelFile(*read_model(data, nominal))
     except LgHuskyError as error:
         raise ModelFileError(f'{name}: {error}') from error
 
@@ -243,22 +116,33 @@ def load_model(path: str | os.PathLike[str] | None = None) -> ModelFile:
         data = read_yaml(place, ModelFileError)
     except ModelFileError as error:
         raise ModelFileError(f'{place}: {error}') from error
-    name = 'husky.yaml' if place == default_model_path() else str(place)
-    return model_from_data(data, name)
+    packaged = place == default_model_path()
+    return model_from_data(data, place.name if packaged else str(place), packaged=packaged)
 
 
-def apply_settings(model: ModelFile, settings: Mapping[str, float]) -> ModelFile:
+def apply_settings(model: ModelFile, settings: Mapping[str, float | Number],
+                   about: str | None = None) -> ModelFile:
     """
-    Return a model with parameters overridden by name (``--set NAME=VALUE``).
+    Return a model with parameters given by hand, by name (``--set NAME=VALUE``).
+
+    Parameters
+    ----------
+    model : ModelFile
+    settings : mapping of str to float or Number
+        Bounds of the robot's own parameters stay in proportion to its size, and move where a
+        value is a little beyond.
+    about : str, optional
+        Where the model comes from; by default what was said of it, and what was set by hand.
 
     Raises
     ------
     ParameterError
-        If a name is unknown or a value out of bounds.
+        If a name is unknown or a number none that the robot can have.
     """
-    parameters = model.parameters.replacing(settings)
-    return ModelFile(model.structure, parameters.with_entries(*(
-        replace(parameters.entry(name), source='set by hand') for name in settings)), model.about)
+    parameters = with_numbers(model.parameters, packaged_parameters(), settings)
+    if about is None:
+        about = about_of(model.about, model.parameters, parameters)
+    return replace(model, parameters=parameters, about=about)
 
 
 def parse_settings(pairs: tuple[str, ...]) -> dict[str, float]:
@@ -280,6 +164,8 @@ def parse_settings(pairs: tuple[str, ...]) -> dict[str, float]:
         if not equals or not name.strip():
             raise ParameterError(
                 f'--set {shown(pair)} is not of the form NAME=VALUE with a number')
+        if name.strip() in RESERVED:
+            raise ParameterError(f'--set {shown(pair)}: {name.strip()} is no parameter')
     return settings
 
 

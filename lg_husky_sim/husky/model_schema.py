@@ -6,10 +6,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from lg_husky_sim.husky.effects import catalogue, descriptions, EffectKind, LATER, OnsetKind
+from lg_husky_sim.husky.effects import (
+    catalogue,
+    descriptions,
+    EffectKind,
+    EffectParameter,
+    LATER,
+    OnsetKind,
+)
 from lg_husky_sim.husky.model import Drivetrain
+from lg_husky_sim.husky.robot_size import RobotSize
 
 SCHEMA = 'lg_husky_sim/model/1'
+
+#: A robot of other units: what it has in proportion has no limits that all robots share.
+LARGE = RobotSize(2.0, 3.0, 5.0)
 
 _NUMBER = {'type': 'number'}
 _FLAG = {'type': 'boolean'}
@@ -17,12 +28,14 @@ _FLAG = {'type': 'boolean'}
 _TEXT = {'type': ['string', 'number', 'boolean', 'null']}
 PARAMETER: dict[str, Any] = {
     'type': 'object', 'additionalProperties': False,
-    'required': ['value', 'unit', 'lower', 'upper', 'source'],
+    'required': ['value'],
     'properties': {
         'value': {**_NUMBER, 'description': 'In the unit, within the bounds.'},
-        'unit': {**_TEXT, 'description': "SI; '1' if none."},
-        'lower': {**_NUMBER, 'description': 'Lower bound, in the unit.'},
-        'upper': {**_NUMBER, 'description': 'Upper bound, in the unit.'},
+        'unit': {**_TEXT, 'description': "SI, that of the packaged model; '1' if none."},
+        'lower': {**_NUMBER, 'description':
+                  'Lower bound, in the unit; by default in proportion to the robot.'},
+        'upper': {**_NUMBER, 'description':
+                  'Upper bound, in the unit; by default in proportion to the robot.'},
         'tolerance': {**_NUMBER, 'description':
                       'Relative uncertainty of a nominal value; 0 for an exact one.'},
         'free': {**_FLAG, 'description': 'Whether identify varies it unless told otherwise.'},
@@ -30,6 +43,8 @@ PARAMETER: dict[str, Any] = {
         'low': {'type': ['number', 'null'], 'description': '95 % interval of an estimate.'},
         'high': {'type': ['number', 'null'], 'description': '95 % interval of an estimate.'}}}
 _REF = {'$ref': '#/definitions/parameter'}
+# In full, or the value alone.
+_SHORT = {'if': {'type': 'object'}, 'then': _REF, 'else': _NUMBER}
 EFFECT: dict[str, Any] = {
     'type': 'object', 'required': ['effect'], 'additionalProperties': False,
     'properties': {
@@ -61,15 +76,24 @@ TOP: dict[str, Any] = {
         'schema': {'const': SCHEMA},
         'about': {**_TEXT, 'description': 'Where the model comes from, in a line.'},
         'structure': STRUCTURE,
-        'parameters': {'type': 'object', 'additionalProperties': _REF},
+        'parameters': {'type': 'object', 'additionalProperties': _REF, 'description':
+                       'By name, in full or as a number; what is left out is that of the '
+                       'packaged model.'},
         'effects': {'type': ['array', 'null'], 'items': EFFECT}}}
+
+
+def _limits(parameter: EffectParameter) -> dict[str, float]:
+    # Of a large robot they are larger; what no size changes is a limit for all.
+    if LARGE.factor(parameter.unit) == 1.0:
+        return {'minimum': parameter.lower, 'maximum': parameter.upper}
+    return {'minimum': 0.0} if parameter.lower >= 0.0 else {}
 
 
 def _effect(kind: EffectKind) -> dict[str, Any]:
     """Return what an entry of this effect may hold, given that it is one."""
     own = {f'{p.name}{again}': {
         'description': f'[{p.unit}] {p.source}',
-        'anyOf': [{'type': 'number', 'minimum': p.lower, 'maximum': p.upper}, _REF]}
+        'anyOf': [{'type': 'number', **_limits(p)}, _REF]}
         for p in kind.parameters for again in ('', LATER)}
     return {
         'if': {'properties': {'effect': {'const': kind.id}}, 'required': ['effect']},
@@ -94,7 +118,7 @@ def json_schema(nominal: dict[str, str]) -> dict[str, Any]:
         **EFFECT['properties'],
         'effect': {**EFFECT['properties']['effect'], 'enum': list(kinds)}}}
     parameters = {**TOP['properties']['parameters'], 'required': list(nominal), 'properties': {
-        name: {'description': text, 'allOf': [_REF]} for name, text in nominal.items()}}
+        name: {'description': text, 'allOf': [_SHORT]} for name, text in nominal.items()}}
     return {'title': 'Model of lg_husky', **TOP, 'definitions': {'parameter': PARAMETER},
             'properties': {**TOP['properties'], 'parameters': parameters,
                            'effects': {'type': ['array', 'null'], 'items': effect}}}

@@ -51,6 +51,8 @@ class RobotSize:
 
 #: The robot itself.
 HUSKY = RobotSize()
+#: No number of a robot counts as farther from the Husky's than this factor: powers stay finite.
+FARTHEST = 1e6
 
 
 @cache
@@ -77,6 +79,6 @@ def size_of(robot: Mapping[str, float], husky: Mapping[str, float]) -> RobotSize
     RobotSize
     """
     def times(name: str) -> float:
-        return robot[name] / husky[name]
+        return min(max(robot[name] / husky[name], 1.0 / FARTHEST), FARTHEST)
     return RobotSize(times('mass'), math.sqrt(times('wheel_radius') * times('track')),
                      times('supply_voltage'))

@@ -120,7 +120,7 @@ def test_simulate_is_the_same_bit_for_bit(bag: Path, capsys: Any) -> None:
     (['--commands', 'circle', '--out', 'x', '--rate', 'nan'], 'rate = nan Hz must be positive'),
     (['--commands', 'circle', '--out', 'x', '--set', 'mass'], "--set 'mass' is not of the form"),
     (['--commands', 'circle', '--out', 'x', '--set', 'mas=2'], 'did you mean mass'),
-    (['--commands', 'circle', '--out', 'x', '--set', 'mass=-2'], 'mass = -2 kg is below'),
+    (['--commands', 'circle', '--out', 'x', '--set', 'mass=-2'], 'mass = -2 kg is not positive'),
     (['--commands', 'circle', '--out', 'x', '--topic', 'imu=/a'], 'topics can only be chosen for'),
     (['--commands', 'circle', '--out', 'x', '--model', 'm.yaml'], 'm.yaml'),
 ])

@@ -124,7 +124,7 @@ HOSTILE: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (mass('value', True), 'mass: value = True is not a number'),
     (mass('value', float('nan')), 'mass: value = nan is not finite'),
     (mass('value', 10 ** 400), 'is not finite'),
-    (mass('value', -3.0), 'mass = -3 kg is below its lower bound 1'),
+    (mass('value', -3.0), 'mass = -3 kg is not positive'),
     (mass('lower', None), 'mass: lower = None is not a number'),
     (mass('free', 'maybe'), "parameter mass: free = 'maybe' is neither true nor false"),
     (mass('weight', 1.0), "parameter mass: unknown key 'weight'"),
@@ -158,6 +158,85 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, change: Callable[[dict[str, A
     assert text.startswith(f'{place}: ')
     assert message in text
     assert '\n' not in text
+
+
+def written(tmp_path: Path, parameters: dict[str, Any], **more: Any) -> Path:
+    place = tmp_path / 'model.yaml'
+    place.write_text(yaml.safe_dump({'schema': 'lg_husky_sim/model/1', 'about': 'a small one',
+                                     'parameters': parameters, **more}))
+    return place
+
+
+def test_all_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
+    data = model_data(load_model())
+    parameters: Any = data['parameters']
+    parameters['mass'] = {'vlaue': 6.0, 'unit': 'kg', 'lower': 1.0, 'upper': 50.0}
+    parameters['track'].update(value='wide', free='maybe')
+    parameters['wheel_inertia']['unit'] = 'g·m²'
+    parameters['wheel_radios'] = parameters.pop('wheel_radius')
+    del parameters['supply_voltage']
+    parameters['yaw_inertia']['value'] = -1.0
+    place = written(tmp_path, parameters, effects=[
+        {'effect': 'slop'}, {'effect': 'slope', 'parameters': {'slope_z': 1.0, 'slope_x': 'up'}}],
+        structre={})
+    with pytest.raises(ModelFileError) as caught:
+        load_model(place)
+    head, *lines = str(caught.value).split('\n  ')
+    assert head == f'{place}: {len(lines)} errors'
+    assert [line.partition(' (known: ')[0] for line in lines] == [
+        "unknown key 'structre'; did you mean structure?",
+        "unknown parameter 'wheel_radios'; did you mean wheel_radius?",
+        'parameter supply_voltage is missing',
+        "parameter mass: unknown key 'vlaue'; did you mean value?",
+        "parameter track: free = 'maybe' is neither true nor false",
+        "track: value = 'wide' is not a number",
+        "wheel_inertia: unit = 'g·m²' is not kg·m²",
+        'yaw_inertia = -1 kg·m² is not positive',
+        next(line for line in lines if line.startswith("unknown effect 'slop'; did you mean slop")
+             ).partition(' (known: ')[0],
+        "effect slope: unknown parameter 'slope_z'; did you mean slope_y?",
+        "slope_x: value = 'up' is not a number"]
+
+
+def test_a_file_without_end_of_errors_says_so_many(tmp_path: Path) -> None:
+    with pytest.raises(ModelFileError) as caught:
+        load_model(written(tmp_path, {f'{k}thing': 1.0 for k in range(30)}))
+    lines = str(caught.value).split('\n')
+    assert len(lines) == 22
+    assert lines[-1] == '  and 27 more'
+
+
+def test_numbers_alone_are_a_robot(tmp_path: Path) -> None:
+    """What is left out is the packaged robot's; its bounds are in proportion."""
+    nominal = load_model().parameters
+    values = {entry.name: entry.value for entry in nominal.entries}
+    model = load_model(written(tmp_path, values))
+    for entry in nominal.entries:
+        assert model.parameters.entry(entry.name) == dataclasses.replace(entry, source='not told')
+    told = {'value': 10.0 * values['mass'], 'source': 'scales', 'tolerance': 0.01}
+    heavy = load_model(written(tmp_path, {**values, 'mass': told}))
+    mass, damping = (heavy.parameters.entry(name) for name in ('mass', 'wheel_damping'))
+    assert (mass.lower, mass.upper, mass.tolerance, mass.source) == (1.0, 5000.0, 0.01, 'scales')
+    assert (damping.lower, damping.upper, damping.free) == (0.1, 1000.0, True)
+
+
+def test_effects_of_a_large_robot_are_in_proportion(tmp_path: Path) -> None:
+    values = {entry.name: entry.value for entry in load_model().parameters.entries}
+    values['mass'] *= 10.0
+    model = load_model(written(tmp_path, values, effects=[
+        {'effect': 'slope', 'parameters': {'slope_x': 900.0}}]))
+    assert model.parameters['slope_x'] == 900.0
+    assert model.parameters['slope_y'] == pytest.approx(80.0)
+    assert load_model(written(tmp_path, model_data(model)['parameters'],  # type: ignore[arg-type]
+                              effects=model_data(model)['effects'])).parameters == model.parameters
+
+
+def test_a_file_of_the_packaged_files_name_is_a_file_like_others(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, {'mass': 6.0}).rename('husky.yaml')
+    with pytest.raises(ModelFileError, match='parameter track is missing'):
+        load_model('husky.yaml')
 
 
 @pytest.mark.parametrize('content', [

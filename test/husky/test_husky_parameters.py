@@ -96,9 +96,12 @@ def test_settings_of_the_command_line() -> None:
     for text in ('mass', 'mass=', 'mass=heavy', '=3', 'mass=1,5'):
         with pytest.raises(ParameterError, match='is not of the form NAME=VALUE'):
             parse_settings((text,))
+    for text in ('model=3', 'about=1', 'self=2'):
+        with pytest.raises(ParameterError, match='is no parameter'):
+            parse_settings((text,))
     model = apply_settings(load_model(), {'track': 0.555})
     assert model.parameters['track'] == 0.555
-    with pytest.raises(ParameterError, match='track = -1 m is below its lower bound'):
+    with pytest.raises(ParameterError, match='track = -1 m is not positive'):
         apply_settings(load_model(), {'track': -1.0})
     with pytest.raises(ParameterError, match='is not a finite number'):
         apply_settings(load_model(), parse_settings(('track=nan',)))

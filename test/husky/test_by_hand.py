@@ -1,0 +1,139 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Robots that a person describes: numbers, what is known of them, and bounds that follow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, cast
+
+import lg_husky_sim as lg
+from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.husky.by_hand import setting
+from lg_husky_sim.husky.model_file import load_model
+import numpy as np
+import pytest
+
+#: A robot of 6 kg at 12 V and one of 280 kg at 48 V.
+SMALL: dict[str, Any] = {
+    'mass': 6.0, 'yaw_inertia': 0.08, 'wheel_radius': 0.05, 'track': 0.24, 'wheelbase': 0.18,
+    'wheel_inertia': 8e-4, 'motor_resistance': 1.8, 'motor_inductance': 1e-3,
+    'torque_constant': 0.02, 'gear_ratio': 30.0, 'supply_voltage': 12.0,
+    'wheel_damping': 0.02, 'yaw_damping': 0.15, 'command_gain': 1.0, 'turn_ratio': 0.22}
+LARGE: dict[str, Any] = {
+    'mass': 280.0, 'yaw_inertia': 45.0, 'wheel_radius': 0.3, 'track': 1.1, 'wheelbase': 0.9,
+    'wheel_inertia': 3.5, 'motor_resistance': 0.12, 'motor_inductance': 2e-4,
+    'torque_constant': 0.16, 'gear_ratio': 30.0, 'supply_voltage': 48.0,
+    'wheel_damping': 130.0, 'yaw_damping': 150.0, 'command_gain': 0.2, 'turn_ratio': 1.0}
+
+
+@pytest.mark.parametrize('numbers', [SMALL, LARGE], ids=['6 kg', '280 kg'])
+def test_robots_of_6_and_280_kg_can_be_described(
+        tmp_path: Path, numbers: dict[str, Any]) -> None:
+    robot = lg.Husky(about='ours', **numbers)
+    for entry in robot.parameters.entries:
+        assert entry.lower <= entry.value <= entry.upper
+        if entry.name in numbers:
+            assert (entry.value, entry.source) == (numbers[entry.name], 'set by hand')
+    robot.save(tmp_path / 'robot.yaml')
+    assert lg.Husky(tmp_path / 'robot.yaml').model == robot.model
+    assert 'Husky A200' not in (tmp_path / 'robot.yaml').read_text(encoding='utf-8').split(
+        'parameters:')[0]
+
+
+@pytest.mark.parametrize(('numbers', 'message'), [
+    ({'mass': -3.0}, 'mass = -3 kg is not positive'),
+    ({'mass': 0.0}, 'mass = 0 kg is not positive'),
+    ({'belt_damping': -1.0}, 'belt_damping = -1 N·m·s/rad is negative'),
+    ({'mass': lg.Number(-3.0, lower=-9.0)}, 'mass = -3 kg is not positive'),
+    ({'wheel_radius': 98.0}, 'wheel_radius = 98 m is above its upper bound 2 by more than a '
+     'factor of 10; if it is right, give it a bound of its own'),
+    ({'mass': 0.01}, 'mass = 0.01 kg is below its lower bound 1 by more than a factor of 10'),
+    ({'mass': 'heavy'}, "mass = 'heavy' is not a number"),
+    ({'mass': True}, 'mass = True is not a number'),
+    ({'mass': float('nan')}, 'mass = nan kg is not a finite number'),
+    ({'mass': 10 ** 400}, 'mass = inf kg is not a finite number'),
+    ({'mas': 3.0}, "unknown parameter 'mas'; did you mean mass?"),
+    ({'mass': lg.Number(30.0, upper=20.0)}, 'mass = 30 kg is above its upper bound 20'),
+    ({'mass': lg.Number(30.0, lower=40.0)}, 'mass = 30 kg is below its lower bound 40'),
+    ({'about': 3.0}, 'about = 3.0 is not a text'),
+])
+def test_nonsense_is_refused_in_a_line(numbers: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        lg.Husky(**numbers)
+    assert str(caught.value).startswith(message)
+    assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize(('given', 'message'), [
+    ({'tolerance': -0.1}, 'tolerance = -0.1 is negative'),
+    ({'upper': float('inf')}, 'upper = inf is not a finite number'),
+    ({'value': '17'}, "value = '17' is not a number"),
+    ({'free': 'yes'}, "free = 'yes' is neither True nor False"),
+    ({'source': 3}, 'source = 3 is not a text'),
+])
+def test_what_is_known_of_a_number_is_checked(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        lg.Number(**given)
+    assert str(caught.value) == message
+
+
+def test_a_number_says_what_is_known_of_it_and_the_rest_stays(tmp_path: Path) -> None:
+    nominal, float32 = load_model().parameters, cast('float', np.float32(0.01))
+    robot = lg.Husky(
+        mass=lg.Number(17.0, tolerance=0.02, lower=15.0, upper=20.0, source='scales', free=True),
+        motor_resistance=lg.Number(tolerance=0.15), wheel_inertia=lg.Number(float32, source='CAD'),
+        about='Clearpath Jackal of our lab')
+    robot.save(tmp_path / 'jackal.yaml')
+    again = lg.Husky(tmp_path / 'jackal.yaml')
+    assert again.model.about == 'Clearpath Jackal of our lab'
+    mass, resistance = (again.parameters.entry(name) for name in ('mass', 'motor_resistance'))
+    assert (mass.value, mass.tolerance, mass.lower, mass.upper, mass.source, mass.free) == (
+        17.0, 0.02, 15.0, 20.0, 'scales', True)
+    assert (resistance.value, resistance.tolerance) == (0.46, 0.15)
+    assert resistance.source == nominal.entry('motor_resistance').source
+    assert again.parameters['wheel_inertia'] == pytest.approx(0.01)
+
+
+def test_bounds_stay_in_proportion_and_those_of_the_same_robot_as_they_are() -> None:
+    nominal = load_model().parameters
+    same = lg.Husky(command_gain=0.9, wheel_damping=2.0).parameters
+    assert [(e.lower, e.upper) for e in same.entries] == [
+        (e.lower, e.upper) for e in nominal.entries]
+    heavy = lg.Husky(mass=4.0 * nominal['mass'], supply_voltage=48.0).parameters
+    for name, factor in (('wheel_damping', 4.0), ('motor_resistance', 1.0), ('turn_ratio', 1.0),
+                         ('torque_constant', 2.0), ('command_gain', 1.0), ('mass', 1.0)):
+        here, there = heavy.entry(name), nominal.entry(name)
+        assert (here.lower, here.upper) == (factor * there.lower, factor * there.upper), name
+
+
+@pytest.mark.parametrize(('name', 'value'), [
+    ('wheel_damping', 120.0), ('command_gain', 0.03), ('mass', 0.5)])
+def test_a_value_a_little_beyond_moves_its_bound(name: str, value: float) -> None:
+    entry = lg.Husky(None, **{name: value}).parameters.entry(name)
+    nominal = load_model().parameters.entry(name)
+    if value > nominal.upper:
+        assert (entry.lower, entry.upper) == (nominal.lower, setting('reach') * value)
+    else:
+        assert (entry.lower, entry.upper) == (value / setting('reach'), nominal.upper)
+
+
+def test_a_bound_of_its_own_allows_what_else_is_a_slip() -> None:
+    entry = lg.Husky(wheel_radius=lg.Number(98.0, upper=200.0)).parameters.entry('wheel_radius')
+    assert (entry.value, entry.upper) == (98.0, 200.0)
+
+
+def test_a_model_says_where_it_comes_from() -> None:
+    husky = lg.Husky()
+    paper = "Clearpath Husky A200 with the paper's parameters"
+    assert husky.model.about == paper
+    assert lg.Husky(mass=62.0).model.about == f'{paper}; mass set by hand'
+    assert lg.Husky(mass=62.0).replacing(mass=63.0, wheel_radius=0.165).model.about == (
+        f'{paper}; wheel_radius, mass set by hand')
+    other = lg.Husky(**SMALL)
+    assert other.model.about == ('robot of 6 kg, wheel radius 0.05 m, track 0.24 m; '
+                                 '15 parameters set by hand')
+    assert repr(other) == f'<Husky {other.model.about}>'
+    assert other.replacing(about='ours', mass=6.5).model.about == 'ours'
+    assert lg.Husky(other.replacing(about='ours')).replacing(wheel_damping=0.1).model.about == (
+        'ours; wheel_damping set by hand')
