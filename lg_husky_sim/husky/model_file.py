@@ -47,7 +47,7 @@ class ModelFile:
 
     def in_proportion(self) -> ModelFile:
         """Return this model with effects that it may get in proportion to its robot."""
-        robot = size_of(self.parameters, load_model(default_model_path()).parameters)
+        robot = size_of(self.parameters, packaged().parameters)
         effects = tuple(replace(effect, robot=robot) for effect in self.structure.effects)
         return replace(self, structure=replace(self.structure, effects=effects, robot=robot))
 
@@ -57,7 +57,12 @@ def default_model_path() -> Path:
     return config_path('husky.yaml')
 
 
-def model_from_data(data: object, name: str, *, packaged: bool = False) -> ModelFile:
+def packaged() -> ModelFile:
+    """Return the packaged Husky, whatever files there are."""
+    return load_model(default_model_path())
+
+
+def model_from_data(data: object, name: str, *, complete: bool = False) -> ModelFile:
     """
     Read a model out of parsed YAML.
 
@@ -67,8 +72,8 @@ def model_from_data(data: object, name: str, *, packaged: bool = False) -> Model
         As ``yaml.safe_load`` gives it.
     name : str
         What to call it in messages.
-    packaged : bool
-        Whether it is the packaged robot, of which every key must be told.
+    complete : bool
+        Whether every key must be told, as of the packaged robot.
 
     Returns
     -------
@@ -79,7 +84,7 @@ def model_from_data(data: object, name: str, *, packaged: bool = False) -> Model
     ModelFileError
         If something is missing, unknown or of the wrong type: all of it, a line each.
     """
-    nominal = None if packaged else load_model(default_model_path()).parameters
+    nominal = None if complete else packaged().parameters
     try:
         return ModelFile(*read_model(data, nominal))
     except LgHuskyError as error:
@@ -88,7 +93,7 @@ def model_from_data(data: object, name: str, *, packaged: bool = False) -> Model
 
 def packaged_parameters() -> tuple[str, ...]:
     """Return the names that every model must hold."""
-    return tuple(load_model(default_model_path()).parameters)
+    return tuple(packaged().parameters)
 
 
 def load_model(path: str | os.PathLike[str] | None = None) -> ModelFile:
@@ -116,8 +121,8 @@ def load_model(path: str | os.PathLike[str] | None = None) -> ModelFile:
         data = read_yaml(place, ModelFileError)
     except ModelFileError as error:
         raise ModelFileError(f'{place}: {error}') from error
-    packaged = place == default_model_path()
-    return model_from_data(data, place.name if packaged else str(place), packaged=packaged)
+    ours = place == default_model_path()
+    return model_from_data(data, place.name if ours else str(place), complete=ours)
 
 
 def apply_settings(model: ModelFile, settings: Mapping[str, float | Number],

@@ -82,3 +82,23 @@ def size_of(robot: Mapping[str, float], husky: Mapping[str, float]) -> RobotSize
         return min(max(robot[name] / husky[name], 1.0 / FARTHEST), FARTHEST)
     return RobotSize(times('mass'), math.sqrt(times('wheel_radius') * times('track')),
                      times('supply_voltage'))
+
+
+def speeds_of(robot: Mapping[str, float], husky: Mapping[str, float]
+              ) -> tuple[float, float, float]:
+    """
+    Return how fast a robot drives at the same share of its supply, in parts of the Husky.
+
+    Parameters
+    ----------
+    robot, husky : mapping of str to float
+        Parameters of its model, and of the packaged one.
+
+    Returns
+    -------
+    forward, yaw, wheels : float
+        Of forward speed, yaw rate and wheel rates.
+    """
+    forward = husky['command_gain'] / robot['command_gain']
+    return (forward, forward * (husky['turn_ratio'] / robot['turn_ratio']),
+            forward * (husky['wheel_radius'] / robot['wheel_radius']))

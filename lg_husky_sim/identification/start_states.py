@@ -30,15 +30,13 @@ from scipy.special import ndtri
 
 #: Name of the whole among the unknowns of a recording.
 INITIAL_STATE = 'initial_state'
-#: Corrections of the start: unit, bound on either side, step of a difference, and standard
-#: deviations of the prior where the start was measured and where it was not. Measured: what a
-#: jump of the localisation, or hard braking over the first samples, puts a measurement off.
-#: Not measured: as fast as a Husky drives. So the prior decides what the values leave open.
-WIDTHS: dict[str, tuple[str, float, float, float, float]] = {
-    'initial_forward': ('m/s', 6.0, 0.01, 0.5, 1.0),
-    'initial_yaw': ('rad/s', 6.0, 0.01, 0.3, 1.0),
-    'initial_left': ('rad/s', 40.0, 0.05, 1.0, 6.0),
-    'initial_right': ('rad/s', 40.0, 0.05, 1.0, 6.0),
+#: Corrections of the start: unit, step of a difference, name in ``config/identification.yaml``,
+#: and the place of its factor among those by which another robot is faster than the Husky.
+QUANTITIES: dict[str, tuple[str, float, str, int]] = {
+    'initial_forward': ('m/s', 0.01, 'start_forward', 0),
+    'initial_yaw': ('rad/s', 0.01, 'start_yaw', 1),
+    'initial_left': ('rad/s', 0.05, 'start_wheels', 2),
+    'initial_right': ('rad/s', 0.05, 'start_wheels', 2),
 }
 
 
@@ -127,7 +125,8 @@ def remembered(plant: Plant, settle: float) -> tuple[int, ...]:
     return tuple(kept)
 
 
-def start_unknowns(data: Observations, plant: Plant, settle: float
+def start_unknowns(data: Observations, plant: Plant, settle: float,
+                   faster: tuple[float, float, float] = (1.0, 1.0, 1.0)
                    ) -> tuple[Unknown, ...]:
     """
     Return the corrections of the start of every segment that begins in motion.
@@ -139,6 +138,8 @@ def start_unknowns(data: Observations, plant: Plant, settle: float
         As given, before the fit.
     settle : float
         When the first values are used [s].
+    faster : tuple of float
+        The robot's forward speed, yaw rate and wheel rates, in parts of the Husky's.
 
     Returns
     -------
@@ -164,10 +165,13 @@ def start_unknowns(data: Observations, plant: Plant, settle: float
         if at_rest(segment):
             continue
         for place in places:
-            _, bound, step, measured, open_ = WIDTHS[CORRECTIONS[place]]
-            deviation = measured if segment.measured[place] else open_
-            found.append(Unknown(correction_name(segment, place), False, 0.0, deviation, -bound,
-                                 bound, step, extra=True, local=(number, place)))
+            _, step, entry, which = QUANTITIES[CORRECTIONS[place]]
+            times = faster[which]
+            kind = 'measured' if segment.measured[place] else 'unmeasured'
+            bound = times * setting(f'{entry}_bound')
+            found.append(Unknown(
+                correction_name(segment, place), False, 0.0, times * setting(f'{entry}_{kind}'),
+                -bound, bound, times * step, extra=True, local=(number, place)))
     return tuple(found)
 
 
@@ -195,7 +199,7 @@ def start_states(data: Observations, unknowns: Sequence[Unknown], values: Sequen
         segment, place = data.segments[unknown.local[0]], unknown.local[1]
         quantity = CORRECTIONS[place]
         found.append(StartState(
-            unknown.name, quantity, segment.name, WIDTHS[quantity][0],
+            unknown.name, quantity, segment.name, QUANTITIES[quantity][0],
             segment.initial_state[place], value,
             value - reach * deviation, value + reach * deviation,
             deviation < setting('prior_share') * unknown.deviation,
@@ -243,6 +247,6 @@ def start_warnings(starts: Sequence[StartState]) -> list[str]:
         stuck = [one for one in own if one.at_bound]
         if stuck:
             said.append(f'{quantity} ended on its bound {math.copysign(1.0, stuck[0].value):+.0f}'
-                        f'·{WIDTHS[quantity][1]:g} {stuck[0].unit} in {len(stuck)} of {len(own)} '
+                        f'·{abs(stuck[0].value):g} {stuck[0].unit} in {len(stuck)} of {len(own)} '
                         f'segments, first in {stuck[0].segment}')
     return said

@@ -10,8 +10,9 @@ import math
 from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.effects import EffectParameter
 from lg_husky_sim.husky.model import compile_model
-from lg_husky_sim.husky.model_file import ModelFile
-from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.husky.model_file import ModelFile, packaged
+from lg_husky_sim.husky.parameters import Parameter, Parameters
+from lg_husky_sim.husky.robot_size import size_of, speeds_of
 from lg_husky_sim.identification.least_squares import effect_unknown, Unknown
 from lg_husky_sim.identification.paper import paper
 from lg_husky_sim.identification.problem import Observations
@@ -122,7 +123,8 @@ def unknowns_of(model: ModelFile, names: Sequence[str], nuisance: Sequence[str],
         found.append(Unknown(name, False, 0.0, math.inf, lower, upper, step, extra=True))
     if INITIAL_STATE in nuisance and data is not None:
         found += start_unknowns(data, compile_model(model.structure).at(model.parameters),
-                                settle_of(model.structure, nuisance))
+                                settle_of(model.structure, nuisance),
+                                speeds_of(model.parameters, packaged().parameters))
     return tuple(found)
 
 
@@ -163,7 +165,7 @@ def starts_of(model: ModelFile, unknowns: Sequence[Unknown], count: int, seed: i
                 sizes = of_effects[unknown.name].starts
                 given = sizes[number % len(sizes)] * 1.3 ** shift
             elif number and unknown.logarithmic:
-                unsure = model.parameters.entry(unknown.name).tolerance >= 1.0
+                unsure = _unsure(model.parameters.entry(unknown.name))
                 given *= (AROUND if unsure else NEAR) ** shift
             values[unknown.name] = min(max(given, unknown.lower), unknown.upper)
         result.append(values)
@@ -175,6 +177,9 @@ def search_bounds(parameters: Parameters, names: Sequence[str]
     """
     Return the box of a search by populations: the paper's bounds where it states them.
 
+    They are in proportion to the robot: to the given value where that is known to some
+    tolerance, to its size where nobody knows it. The given value is always inside.
+
     Parameters
     ----------
     parameters : Parameters
@@ -184,8 +189,19 @@ def search_bounds(parameters: Parameters, names: Sequence[str]
     -------
     lower, upper : numpy.ndarray, shape (n_names,)
     """
-    search = paper().search
-    rows = [(search[n].lower, search[n].upper) if n in search else
-            (parameters.entry(n).lower, parameters.entry(n).upper) for n in names]
+    robot = size_of(parameters, packaged().parameters)
+    rows = []
+    for entry in map(parameters.entry, names):
+        stated = paper().search.get(entry.name)
+        if stated is None:
+            rows.append((entry.lower, entry.upper))
+            continue
+        factor = robot.factor(stated.unit) if _unsure(entry) else entry.value / stated.result
+        rows.append((max(entry.lower, min(factor * stated.lower, entry.value)),
+                     min(entry.upper, max(factor * stated.upper, entry.value))))
     box = np.array(rows, dtype=np.float64).reshape(-1, 2)
     return box[:, 0], box[:, 1]
+
+
+def _unsure(entry: Parameter) -> bool:
+    return entry.tolerance >= 1.0

@@ -62,7 +62,7 @@ def test_each_recording_on_its_own_gives_the_same_numbers(
     (['--out', 'fit.txt'], 'a model file ends in .yaml'),
     (['--out', 'fit.yaml', '--free', 'weight'], "unknown parameter 'weight'"),
     (['--out', 'fit.yaml', '--effects', 'wind'], "unknown effect 'wind'"),
-    (['--out', 'fit.yaml', '--set', 'mass=-1'], 'below its lower bound'),
+    (['--out', 'fit.yaml', '--set', 'mass=-1'], 'mass = -1 kg is not positive'),
     (['--out', 'fit.yaml', '--nuisance', 'x'], "unknown nuisance 'x'"),
 ])
 def test_bad_input_is_one_line_and_leaves_nothing(
