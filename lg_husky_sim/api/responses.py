@@ -8,11 +8,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
-from lg_husky_sim.linear_graph import LinearGraph, StateSpace, SymbolicStateSpace
+from lg_husky_sim.api.curves import FrequencyResponse, StepResponse
+from lg_husky_sim.api.transfer_functions import TransferFunction
+from lg_husky_sim.errors import GraphError
+from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, StateSpace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-FloatArray = NDArray[np.float64]
 
 
 class Responses(ABC):
@@ -24,95 +25,122 @@ class Responses(ABC):
 
     graph: LinearGraph
     values: Mapping[str, float]
-
-    @property
-    @abstractmethod
-    def symbolic(self) -> SymbolicStateSpace:
-        """The model in symbols."""
+    outputs: tuple[str, ...]
 
     @abstractmethod
     def numeric(self, **values: float) -> StateSpace:
         """Return the model in numbers."""
 
-    def transfer_function(self, output: str = '', source: str = '', *,
-                          numbers: bool = False) -> Any:
+    def transfer_function(self, output: str = '', source: str = '', *, numbers: bool = False,
+                          by_parameter: bool = False, **values: float) -> Any:
         """
-        Return the transfer function from an input to an output, in symbols and ``s``.
+        Return the transfer function from an input to an output.
 
         Parameters
         ----------
         output, source : str
-            Names, such as ``'omega(J)'`` and ``'V_s'``.
+            Names, such as ``'omega(J)'`` and ``'V_s'``; any variable of the graph is an output.
         numbers : bool
-            Put the graph's numbers in first, as exact fractions: in symbols, many states (the
-            Husky's six) take minutes.
+            Put the graph's numbers in.
+        by_parameter : bool
+            In symbols, write the parameters' expressions instead of the elements' names. Where
+            elements share parameters, more cancels: from one motor to the speed of the Husky's
+            body, three of six poles.
+        **values : float
+            Parameters by name, SI, in place of the graph's own; then it is in numbers.
 
         Returns
         -------
-        sympy.Expr
-            A cancelled fraction.
+        sympy.Expr or TransferFunction
+            A fraction in ``s`` without common factors, in symbols by powers of ``s``.
 
         Raises
         ------
         GraphError
-            If a name is unknown, or an element is called ``s``.
+            If a name is unknown, an element is called ``s``, or the answer in symbols would fill
+            hundreds of pages.
+        ParameterError
+            In numbers, if a parameter has no number or one that is not allowed.
         """
-        from lg_husky_sim.linear_graph.transfer import element_values, transfer_function
-        if numbers:
-            self.numeric()          # refuses numbers that are missing or not allowed
-        return transfer_function(self.symbolic, *self._positions(output, source),
-                                 element_values(self.graph, self.values) if numbers else None)
+        output, source = self._names(output, source)
+        if numbers or values:
+            return self._in_numbers(output, source, values)
+        from lg_husky_sim.linear_graph.transfer import transfer_function
+        return transfer_function(self.graph, output, source, by_element=not by_parameter)
+
+    def _in_numbers(self, output: str, source: str, values: Mapping[str, float]
+                    ) -> TransferFunction:
+        from lg_husky_sim.linear_graph.exact import fraction_of
+        self.numeric(**values)      # refuses numbers that are missing or not allowed
+        found = fraction_of(self.graph, output, source, {**self.values, **values})
+        return TransferFunction(output, source, self._unit(output, source), found.numerator,
+                                found.denominator, found.zeros, found.poles)
 
     def poles(self, **values: float) -> NDArray[np.complex128]:
-        """Return the eigenvalues of A [1/s], shape (n,), slowest last."""
+        """Return the eigenvalues of A [1/s], shape (n,), fastest first."""
         return self.numeric(**values).poles
 
     def zeros(self, output: str = '', source: str = '', **values: float
               ) -> NDArray[np.complex128]:
         """Return the zeros of a transfer function [1/s], without those that a pole cancels."""
-        from lg_husky_sim.linear_graph.transfer import element_values, transfer_function, zeros
-        self.numeric(**values)      # refuses numbers that are missing or not allowed
-        numbers = element_values(self.graph, {**self.values, **values})
-        return zeros(transfer_function(
-            self.symbolic, *self._positions(output, source), numbers))
+        return self._in_numbers(*self._names(output, source), values).zeros
 
-    def step(self, times: ArrayLike, source: str = '', **values: float) -> FloatArray:
+    def step(self, times: ArrayLike | None = None, output: str = '', source: str = '',
+             **values: float) -> StepResponse:
         """
         Return the outputs after a unit step of one input, from rest.
 
         Parameters
         ----------
-        times : array_like, shape (n_times,)
-            Equally spaced from 0 [s].
-        source : str
-            Which input.
+        times : array_like, shape (n_times,), optional
+            Equally spaced from 0 [s]; until the slowest pole has settled by default.
+        output, source : str
+            Which output (all by default), and which input.
         **values : float
             Parameters by name, SI, in place of the graph's own.
 
         Returns
         -------
-        numpy.ndarray, shape (n_times, n_outputs)
+        StepResponse
 
         Raises
         ------
+        GraphError
+            If there is no output.
         SettingsError
-            If an output has the step's derivative in it (F is not zero).
+            If an output begins with an impulse, as it has the step's derivative in it.
         ParameterError
             If the times are not equally spaced from 0, or a parameter has no number.
         """
-        from lg_husky_sim.linear_graph.transfer import position, step_response
-        return step_response(self.numeric(**values), times,
-                             position(self.symbolic.inputs, source, 'input'))
+        from lg_husky_sim.linear_graph.transfer import (
+            checked_times,
+            final_values,
+            step_response,
+            usual_times,
+        )
+        first, source = self._names(output or self._first_output(), source)
+        space = self._space(first if output else '', values)
+        moments = usual_times(space.poles) if times is None else checked_times(times)
+        found = step_response(space, moments, space.inputs.index(source))
+        final = final_values(space, space.inputs.index(source))
+        if final is None:       # an output may settle all the same
+            answers = [self._in_numbers(name, source, values) for name in space.outputs]
+            final = np.array([one.dc_gain if (one.poles.real < 0.0).all() else np.nan
+                              for one in answers])
+        return StepResponse(
+            moments, found, space.outputs, tuple(map(self._unit, space.outputs)), source,
+            self._unit(source), final)
 
-    def bode(self, rates: ArrayLike, output: str = '', source: str = '', **values: float
-             ) -> tuple[FloatArray, FloatArray]:
+    def bode(self, rates: ArrayLike | None = None, output: str = '', source: str = '',
+             **values: float) -> FrequencyResponse:
         """
         Return gain [dB] and phase [deg] of a transfer function.
 
         Parameters
         ----------
-        rates : array_like, shape (k,)
-            Angular frequencies [rad/s].
+        rates : array_like, shape (k,), optional
+            Angular frequencies [rad/s]; by default from a decade below all poles and zeros to
+            one above.
         output, source : str
             Names of the output and the input.
         **values : float
@@ -120,15 +148,62 @@ class Responses(ABC):
 
         Returns
         -------
-        tuple of numpy.ndarray, shapes (k,) and (k,)
-            The phase without jumps.
-        """
-        from lg_husky_sim.linear_graph.transfer import frequency_response
-        found = frequency_response(self.numeric(**values), rates,
-                                   *self._positions(output, source))
-        return 20.0 * np.log10(np.abs(found)), np.rad2deg(np.unwrap(np.angle(found)))
+        FrequencyResponse
+            ``gain, phase = graph.bode(rates)`` gives the arrays, the phase without jumps.
 
-    def _positions(self, output: str, source: str) -> tuple[int, int]:
+        Raises
+        ------
+        ParameterError
+            If there is a pole at one of the frequencies, or a parameter has no number.
+        """
+        from lg_husky_sim.linear_graph.transfer import (
+            checked_rates,
+            frequency_response,
+            MOST_EXACT,
+            phase_of,
+            usual_rates,
+        )
+        output, source = self._names(output, source)
+        space = self._space(output, values)
+        fraction = None
+        if rates is None or len(space.states) <= MOST_EXACT:
+            fraction = self._in_numbers(output, source, values)
+        if rates is None and fraction is not None:
+            rates = usual_rates(np.concatenate([fraction.poles, fraction.zeros]))
+        at = checked_rates([] if rates is None else rates)
+        found = frequency_response(space, at, 0, space.inputs.index(source))
+        angles = np.rad2deg(np.unwrap(np.angle(found))) if fraction is None else phase_of(
+            at, fraction.zeros, fraction.poles, fraction.gain)
+        return FrequencyResponse(at, found, angles, output, source, self._unit(output, source))
+
+    def _names(self, output: str, source: str) -> tuple[str, str]:
+        """Return the names of an output and an input; one that is alone need not be given."""
         from lg_husky_sim.linear_graph.transfer import position
-        model = self.symbolic
-        return position(model.outputs, output, 'output'), position(model.inputs, source, 'input')
+        model = compile_numeric(self.graph, self.outputs, chained=True)
+        source = model.inputs[position(model.inputs, source, 'input')]
+        if not output:
+            return model.outputs[position(model.outputs, '', 'output')], source
+        try:        # any variable of the graph will do
+            return self.graph.variable(output).name, source
+        except GraphError as error:
+            raise GraphError(f'unknown output: {error}') from error
+
+    def _first_output(self) -> str:
+        if not self.outputs:
+            raise GraphError("the graph has no output; name one, such as output='v(m)'")
+        return self.outputs[0]
+
+    def _space(self, output: str, values: Mapping[str, float]) -> StateSpace:
+        """Return the model in numbers with one output, any variable, or with all of its own."""
+        space = self.numeric(**values)      # refuses numbers that are missing or not allowed
+        if not output:
+            return space
+        return compile_numeric(self.graph, [output], chained=True).at({**self.values, **values})
+
+    def _unit(self, name: str, over: str = '') -> str:
+        from lg_husky_sim.linear_graph.units import quotient, unit_of
+        own = unit_of(self.graph, name)
+        if not over:
+            return own
+        below = unit_of(self.graph, over)
+        return '' if own == below else quotient(own, below)

@@ -188,8 +188,7 @@ def unit_needed(element: Branch | TwoPort) -> str:
     if isinstance(element, TwoPort):
         (one, *_), (two, *_) = element.port1, element.port2
         other = _ACROSS_UNIT if element.kind is Kind.TRANSFORMER else _THROUGH_UNIT
-        return '/'.join(f'({unit})' if re.search(r'[·/]', unit) else unit
-                        for unit in (_ACROSS_UNIT[one], other[two]))
+        return quotient(_ACROSS_UNIT[one], other[two])
     if element.kind in SOURCES:
         across = element.kind is Kind.ACROSS_SOURCE
         return (_ACROSS_UNIT if across else _THROUGH_UNIT)[element.domain]
@@ -197,6 +196,11 @@ def unit_needed(element: Branch | TwoPort) -> str:
         return (_THROUGH_UNIT if element.is_damping else _ACROSS_UNIT)[element.domain]
     usual = _USUAL[element.given_form or Kind.A_TYPE]
     return usual[list(Domain).index(element.domain)]
+
+
+def quotient(above: str, below: str) -> str:
+    """Return one unit over another, such as ``'(rad/s)/V'``."""
+    return '/'.join(f'({unit})' if re.search(r'[·/]', unit) else unit for unit in (above, below))
 
 
 def check_units(graph: LinearGraph, units: Mapping[str, str]) -> tuple[str, ...]:
@@ -250,10 +254,18 @@ def check_units(graph: LinearGraph, units: Mapping[str, str]) -> tuple[str, ...]
     return tuple(unchecked)
 
 
-def _variable(graph: LinearGraph, text: str) -> Dimension:
+def unit_of(graph: LinearGraph, text: str) -> str:
+    """Return the SI unit of a variable such as ``'omega(J_1)'``, or of an input."""
+    for source in graph.of_kind(*SOURCES):
+        if source.characteristic is None and source.input_name == text:
+            return unit_needed(source)
     variable = graph.variable(text)
     domain = graph.edges[variable.edge].domain
-    return parse_unit((_ACROSS_UNIT if variable.is_across else _THROUGH_UNIT)[domain]).dimension
+    return (_ACROSS_UNIT if variable.is_across else _THROUGH_UNIT)[domain]
+
+
+def _variable(graph: LinearGraph, text: str) -> Dimension:
+    return parse_unit(unit_of(graph, text)).dimension
 
 
 def _compare(element: Branch | TwoPort, found: Dimension, shown: str) -> None:

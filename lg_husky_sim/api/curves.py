@@ -1,0 +1,311 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Step and frequency responses of a linear system, as arrays, tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from lg_husky_sim.api.tables import page_part, Table
+from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.extras import require
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+RISE = (0.1, 0.9)
+"""Parts of the final value between which the rise time is taken; the usual ones."""
+BAND = 0.02
+"""Part of the final value within which a response has settled; the usual one."""
+BANDWIDTH = 3.0
+"""Loss of gain [dB] at the bandwidth."""
+LEAST_GAIN, LEAST_PHASE = 20.0, 90.0
+"""Least ranges of gain [dB] and phase [deg] that a picture shows."""
+
+
+def _axes(axes: Any, count: int, what: str, height: float, share: bool = False) -> list[Any]:
+    """Return the axes to draw into, of a new figure if there are none."""
+    require('matplotlib', 'draw figures')
+    if axes is None:
+        from matplotlib import pyplot
+        _, grid = pyplot.subplots(count, 1, figsize=(7.0, 1.0 + height * count), squeeze=False,
+                                  sharex=share, layout='constrained')
+        return list(grid.flat)
+    found = list(np.ravel(np.asarray(axes, dtype=object)))
+    if len(found) != count:
+        raise ParameterError(f'{len(found)} axes given; {what} is drawn into {count}')
+    return found
+
+
+def _titled(axis: Any, title: str) -> None:
+    """Give axes a title, or take it from those that show something else already."""
+    axis.set_title(title if axis.get_title() in ('', title) else '')
+
+
+def _wide(axis: Any, least: float) -> None:
+    """Show no less than a range, so that rounding of a constant is not drawn as a signal."""
+    low, high = axis.get_ylim()
+    if high - low < least:
+        middle = (low + high) / 2.0
+        axis.set_ylim(middle - least / 2.0, middle + least / 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class StepResponse:
+    """
+    The outputs after a unit step of one input, from rest.
+
+    Parameters
+    ----------
+    times : numpy.ndarray, shape (n_times,)
+        [s].
+    values : numpy.ndarray, shape (n_times, n_outputs)
+    names, units : tuple of str
+        Of the outputs.
+    source, source_unit : str
+        The input.
+    final : numpy.ndarray, shape (n_outputs,)
+        What each output settles at, NaN where it does not.
+    """
+
+    times: FloatArray
+    values: FloatArray
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    source: str
+    source_unit: str
+    final: FloatArray
+
+    def __post_init__(self) -> None:
+        """Set the arrays read-only."""
+        for array in (self.times, self.values, self.final):
+            array.setflags(write=False)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> FloatArray:
+        """Return the values."""
+        return np.array(self.values, dtype=dtype)
+
+    def column(self, name: str) -> FloatArray:
+        """
+        Return one output.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such output.
+        """
+        if name not in self.names:
+            raise ParameterError(f'no output {name!r}; there are {", ".join(self.names)}')
+        return self.values[:, self.names.index(name)]
+
+    def to_pandas(self) -> Any:
+        """Return the outputs as a pandas DataFrame, index ``time`` [s]."""
+        require('pandas', 'make a DataFrame')
+        import pandas as pd
+        return pd.DataFrame(self.values.copy(), columns=list(self.names),
+                            index=pd.Index(self.times.copy(), name='time'))
+
+    def table(self) -> Table:
+        """Return final value and peak of each output, rise and settling time and overshoot."""
+        peaks = np.abs(self.values).argmax(axis=0)
+        return Table('', ('output', 'unit', 'final value', 'rise time 10-90 % [s]',
+                          'settling time 2 % [s]', 'overshoot [%]', 'peak', 'peak time [s]'),
+                     tuple((name, unit, None if np.isnan(final) else float(final),
+                            *self._shape(at), float(self.values[peak, at]),
+                            float(self.times[peak]))
+                           for at, (name, unit, final, peak) in enumerate(zip(
+                               self.names, self.units, self.final, peaks, strict=True))))
+
+    def _shape(self, at: int) -> tuple[float | None, float | None, float | None]:
+        """Return rise time, settling time and overshoot of an output; None where not seen."""
+        final = float(self.final[at])
+        if np.isnan(final) or final == 0.0:
+            return None, None, None
+        part = self.values[:, at] / final
+        rise = [self._first_above(part, level) for level in RISE]
+        outside = np.flatnonzero(np.abs(part - 1.0) > BAND)
+        settled = None
+        if not outside.size:
+            settled = 0.0
+        elif outside[-1] + 1 < part.size:
+            last = int(outside[-1])
+            settled = float(np.interp(BAND, np.abs(part[[last + 1, last]] - 1.0),
+                                      self.times[[last + 1, last]]))
+        return (None if rise[0] is None or rise[1] is None else rise[1] - rise[0], settled,
+                max(0.0, 100.0 * float(part.max() - 1.0)))
+
+    def _first_above(self, part: FloatArray, level: float) -> float | None:
+        above = np.flatnonzero(part >= level)
+        if not above.size:
+            return None
+        at = int(above[0])
+        return float(self.times[0]) if at == 0 else float(
+            np.interp(level, part[[at - 1, at]], self.times[[at - 1, at]]))
+
+    def plot(self, axes: Any = None, label: str = '') -> Any:
+        """
+        Draw each output over time, and what it settles at.
+
+        Parameters
+        ----------
+        axes : matplotlib Axes, or a sequence of one for each output, optional
+            Where to draw; a new figure if not given.
+        label : str
+            Name in the legend, to tell several responses apart.
+
+        Returns
+        -------
+        numpy.ndarray of matplotlib Axes, shape (n_outputs,)
+
+        Raises
+        ------
+        ParameterError
+            If there are not as many axes as outputs.
+        """
+        found = _axes(axes, len(self.names), f'a step response of {len(self.names)} outputs',
+                      2.0, share=True)
+        for axis, name, unit, final in zip(found, self.names, self.units, self.final, strict=True):
+            line, = axis.plot(self.times, self.column(name), label=label or None)
+            if not np.isnan(final):
+                axis.axhline(final, color=line.get_color(), lw=0.8, ls=':')
+            axis.set(ylabel=f'{name} [{unit}]', xlim=(self.times[0], self.times[-1]))
+            axis.grid(visible=True, alpha=0.4)
+            if label:
+                axis.legend()
+        _titled(found[0], self._title)
+        found[-1].set_xlabel('time [s]')
+        return np.array(found, dtype=object)
+
+    @property
+    def _title(self) -> str:
+        return f'Step of {self.source} by 1 {self.source_unit}'
+
+    def __str__(self) -> str:
+        """Return the table as text."""
+        return f'{self._title}\n{self.table()}'
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return page_part(self._title, [], [self.table()])
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """
+    Gain and phase of one output over one input; unpacks into the two.
+
+    Parameters
+    ----------
+    rates : numpy.ndarray, shape (k,)
+        Angular frequencies [rad/s].
+    values : numpy.ndarray of complex, shape (k,)
+        Output over input.
+    phase : numpy.ndarray, shape (k,)
+        [deg], without jumps.
+    output, source, unit : str
+        Names, and the unit of output over input; '' if it has none.
+    """
+
+    rates: FloatArray
+    values: ComplexArray
+    phase: FloatArray
+    output: str
+    source: str
+    unit: str
+
+    def __post_init__(self) -> None:
+        """Set the arrays read-only."""
+        for array in (self.rates, self.values, self.phase):
+            array.setflags(write=False)
+
+    @property
+    def gain(self) -> FloatArray:
+        """Gain [dB] of ``unit``, shape (k,)."""
+        with np.errstate(divide='ignore'):
+            return np.asarray(20.0 * np.log10(np.abs(self.values)), dtype=np.float64)
+
+    def __iter__(self) -> Iterator[FloatArray]:
+        """Yield gain [dB] and phase [deg]."""
+        return iter((self.gain, self.phase))
+
+    def to_pandas(self) -> Any:
+        """Return gain and phase as a pandas DataFrame, index ``rate`` [rad/s]."""
+        require('pandas', 'make a DataFrame')
+        import pandas as pd
+        return pd.DataFrame({'gain [dB]': self.gain, 'phase [deg]': self.phase},
+                            index=pd.Index(self.rates.copy(), name='rate'))
+
+    def plot(self, axes: Any = None, label: str = '') -> Any:
+        """
+        Draw gain [dB] and phase [deg] over a logarithmic angular frequency.
+
+        Parameters
+        ----------
+        axes : sequence of two matplotlib Axes, optional
+            Where to draw; a new figure if not given.
+        label : str
+            Name in the legend, to tell several responses apart.
+
+        Returns
+        -------
+        numpy.ndarray of matplotlib Axes, shape (2,)
+
+        Raises
+        ------
+        ParameterError
+            If there are not two axes.
+        """
+        found = _axes(axes, 2, 'a frequency response', 2.2, share=True)
+        from matplotlib.ticker import MultipleLocator
+        gain = f'gain [dB of {self.unit}]' if self.unit else 'gain [dB]'
+        for axis, curve, name in zip(found, self, (gain, 'phase [deg]'),
+                                     strict=True):
+            axis.semilogx(self.rates, curve, label=label or None)
+            axis.set_ylabel(name)
+            axis.grid(visible=True, which='major', alpha=0.5)
+            axis.grid(visible=True, which='minor', alpha=0.2)
+            if label:
+                axis.legend()
+        _wide(found[0], LEAST_GAIN)
+        _wide(found[1], LEAST_PHASE)
+        low, high = found[1].get_ylim()
+        found[1].yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
+        _titled(found[0], self._title)
+        found[1].set_xlabel('angular frequency [rad/s]')
+        return np.array(found, dtype=object)
+
+    def table(self) -> Table:
+        """Return gain and phase at the ends, at the largest gain, and 3 dB below the first."""
+        order = np.argsort(self.rates)
+        rates, gain, phase = (one[order] for one in (self.rates, *self))
+        peak = int(np.argmax(gain))
+        rows = [('lowest', 0), *[('largest gain', peak)] * (0 < peak < gain.size - 1),
+                ('highest', gain.size - 1)]
+        cells = [(name, float(rates[at]), float(gain[at]), float(phase[at])) for name, at in rows]
+        lower = np.flatnonzero(gain < gain[0] - BANDWIDTH)
+        if lower.size and rates[0] > 0.0:
+            span = slice(int(lower[0]) - 1, int(lower[0]) + 1)
+            logs = np.log(rates[span])
+            at = float(np.interp(BANDWIDTH, gain[0] - gain[span], logs))
+            cells.insert(-1, ('3 dB below the lowest', float(np.exp(at)),
+                              float(gain[0] - BANDWIDTH), float(np.interp(at, logs, phase[span]))))
+        return Table('', ('', 'angular frequency [rad/s]', 'gain [dB]', 'phase [deg]'),
+                     tuple(cells))
+
+    @property
+    def _title(self) -> str:
+        return f'{self.output} over {self.source}' + (f' [{self.unit}]' if self.unit else '')
+
+    def __str__(self) -> str:
+        """Return the table as text."""
+        return f'{self._title}\n{self.table()}'
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return page_part(self._title, [], [self.table()])
