@@ -56,6 +56,12 @@ def test_a_robot_with_other_wheels_is_no_husky(drive: lg.Recording) -> None:
                    with_streams(drive, wheels=scaled(drive.wheels, 1.05)).info().warnings)
 
 
+def test_a_robot_that_is_not_that_of_the_model_is_called_so(drive: lg.Recording) -> None:
+    said = drive.info(lg.Husky(wheel_radius=0.1)).warnings
+    assert any(one.startswith('this is not the robot of the model: ') for one in said)
+    assert not any('Husky' in one for one in said)
+
+
 def test_a_robot_of_its_own_dimensions_is_no_stranger_to_its_model(drive: lg.Recording) -> None:
     slow = with_streams(drive, wheels=scaled(drive.wheels, 0.165 / 0.3))
     assert not any('this is not a Husky' in one

@@ -19,6 +19,7 @@ from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.model_file import load_model, model_data, model_from_data, ModelFile
+from lg_husky_sim.husky.model_schema import SCHEMA as MODEL
 from lg_husky_sim.linear_graph.netlist import read_netlist
 from lg_husky_sim.manoeuvres import load_manoeuvre, SCHEMA
 from lg_husky_sim.ros.settings import make_settings, TABLE
@@ -90,7 +91,7 @@ def shipped() -> list[tuple[str, str, object]]:
         for text in re.findall(r'^```yaml\n(.*?)^```', page.read_text(encoding='utf-8'),
                                re.DOTALL | re.MULTILINE):
             block: Any = parse_yaml(text)
-            file = {'elements': 'graph', SCHEMA: 'commands'}.get(
+            file = {'elements': 'graph', SCHEMA: 'commands', MODEL: 'model'}.get(
                 'elements' if 'elements' in block else block.get('schema', ''), 'sim_node')
             found.append((file, page.name, block))
     return found

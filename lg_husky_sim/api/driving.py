@@ -69,6 +69,23 @@ def driven(plant: Plant, values: Mapping[str, float], commands: Drive, rate: flo
     return Recording(name, '', streams, START_NS, frames=('odom', 'base_link'))
 
 
+def fastest_side(commands: TimeSeries, values: Mapping[str, float]) -> float:
+    """
+    Return the largest speed that commands ask of the wheels of a side [m/s].
+
+    Parameters
+    ----------
+    commands : TimeSeries
+        Names forward [m/s] and yaw [rad/s].
+    values : mapping of str to float
+        Parameters of the model: turn_ratio is needed.
+    """
+    if not len(commands):
+        return 0.0
+    forward, turn = np.abs(commands.column('forward')), np.abs(commands.column('yaw'))
+    return float(np.max(forward + values['turn_ratio'] * turn))
+
+
 def _recording(plant: Plant, commands: Drive, topics: Topics) -> rec.Recording | None:
     if isinstance(commands, (str, os.PathLike)) and is_recording(commands):
         read: rec.Recording = rec.read_recording(commands, topic_map(topics))

@@ -284,7 +284,7 @@ class Husky(Graph):
         shown = Table('', ('parameter', 'value', 'unit', 'source'), tuple(
             (p.name, p.value, p.unit, p.source) for p in self.parameters.entries))
         points = {'Effects': [f'{e.id} ({e.side}): {e.kind.title}' for e in self.effects]}
-        return page_part(f'Husky: {self.model.about}', [], [shown], points)
+        return page_part(self.model.about or 'Husky', [], [shown], points)
 
 
 def as_husky(model: PathLike | ModelFile | Husky | None) -> Husky:

@@ -18,6 +18,8 @@ from lg_husky_sim.diagnosis.sensors.regression import Number
 from lg_husky_sim.diagnosis.sensors.relations import Relation, relations
 from lg_husky_sim.diagnosis.sensors.robot import differences
 from lg_husky_sim.errors import FitError, ParameterError, RecordingError
+from lg_husky_sim.husky.by_hand import other_robot
+from lg_husky_sim.husky.model_file import packaged
 from lg_husky_sim.identification.confidence import confidence, undetermined
 from lg_husky_sim.identification.multistart import refine
 from lg_husky_sim.identification.problem import observations
@@ -235,11 +237,12 @@ def _number(one: Number, digits: int) -> str:
 def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relation]
                     ) -> tuple[str, ...]:
     said = [one.statement for one in faults(related)]
+    robot = 'the robot of the model' if other_robot(
+        packaged().parameters, husky.parameters) else 'a Husky'
     for one in differences(related, husky.parameters):
         said.append(one.statement if not one.on_ground else (
-            f'this is not a Husky: {one.statement} (or wheel rates are scaled); give its '
-            'dimensions '
-            'in a model file of its own'))
+            f'this is not {robot}: {one.statement} (or wheel rates are scaled); give its '
+            'dimensions in a model file of its own'))
     fastest = max((float(np.abs(series.column('forward')).max()) for name, series in
                    recording.streams.items() if name == 'command' and len(series)), default=0.0)
     most = 1.0 / husky.parameters['command_gain']

@@ -64,7 +64,13 @@ def command(
     from lg_husky_sim.errors import CommandError
     from lg_husky_sim.evaluation.session import Request, run_evaluation
     from lg_husky_sim.folders import check_folder
-    from lg_husky_sim.husky.model_file import apply_settings, load_model, parse_settings
+    from lg_husky_sim.husky.by_hand import other_robot
+    from lg_husky_sim.husky.model_file import (
+        apply_settings,
+        load_model,
+        packaged,
+        parse_settings,
+    )
     from lg_husky_sim.recording import TopicMap
     from lg_husky_sim.reporting.provenance import provenance
     from lg_husky_sim.reporting.write import check_extras
@@ -73,12 +79,18 @@ def command(
     check_folder(out)
     if (held_out or rivals) and not calibrate:
         raise CommandError('--held-out and --rival need --calibrate REC')
+    start = apply_settings(load_model(model), parse_settings(settings))
     chosen = cases
+    if (cases or not (calibrate or steps)) and other_robot(packaged().parameters,
+                                                           start.parameters):
+        raise CommandError(
+            f'the built-in cases are a Husky, and the model is none (wheel radius '
+            f'{start.parameters["wheel_radius"]:g} m, track {start.parameters["track"]:g} m): '
+            'give recordings of its robot, --calibrate REC --held-out REC or --steps REC')
     if not (cases or calibrate or steps):
         chosen = ('synthetic', 'engine') if find_spec('mujoco') else ('synthetic',)
         if len(chosen) == 1:
             say.remark('without the case engine: it needs MuJoCo, pip install mujoco')
-    start = apply_settings(load_model(model), parse_settings(settings))
     request = Request(chosen, calibrate, held_out, rivals, steps, start, seed, starts, jobs,
                       TopicMap.parse(topics))
     with say.stages(known=False) as report:

@@ -14,7 +14,11 @@ from lg_husky_sim.cli.common import Output, spoken
 
 if TYPE_CHECKING:
     from lg_husky_sim.diagnosis.planning import Rival
+    from lg_husky_sim.husky.parameters import Parameters
     from lg_husky_sim.manoeuvres import Manoeuvre
+
+SPEED, YAW = 0.8, 0.8
+"""Highest speed [m/s] and yaw rate [rad/s] of a Husky's drives, unless told otherwise."""
 
 
 @click.command(short_help='Find the drive that best distinguishes two explanations.')
@@ -28,13 +32,14 @@ if TYPE_CHECKING:
                    'default.')
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='SCRIPT.yaml',
               help='Command script of the best drive, for simulate and drive.')
-@click.option('--max-speed', default=0.8, show_default=True, metavar='M/S',
-              type=click.FloatRange(0.1, 3.0), help='Highest speed of a drive.')
-@click.option('--max-yaw', default=0.8, show_default=True, metavar='RAD/S',
-              type=click.FloatRange(0.1, 3.0), help='Highest yaw rate of a drive.')
+@click.option('--max-speed', metavar='M/S', type=click.FloatRange(min=0.0, min_open=True),
+              help='Highest speed of a drive; 0.8 m/s by default, and less for a robot that is '
+                   'slower than a Husky.')
+@click.option('--max-yaw', metavar='RAD/S', type=click.FloatRange(min=0.0, min_open=True),
+              help='Highest yaw rate of a drive; 0.8 rad/s by default, likewise.')
 @spoken()
 def command(folder: Path | None, effects: str | None, robot: Path | None, out: Path,
-            max_speed: float, max_yaw: float, say: Output) -> None:
+            max_speed: float | None, max_yaw: float | None, say: Output) -> None:
     """
     Write the drive that best distinguishes the first two explanations of a diagnosis.
 
@@ -51,7 +56,8 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     if out.is_dir() or not out.resolve().parent.is_dir():
         raise SettingsError(f'cannot write {out}: it must be a file in an existing folder')
     one, two = _from_folder(folder) if folder is not None else _from_ids(effects or '', robot)
-    candidates = drives(max_speed, max_yaw)
+    speed, rate = _usual(one.parameters)
+    candidates = drives(max_speed or speed, max_yaw or rate)
     with say.stages() as report:
         done = itertools.count(1)
         ranked = plan(one, two, candidates,
@@ -68,6 +74,17 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     say.written(out, f': {best.manoeuvre.name}, {best.manoeuvre.about}')
     if best.nats < setting('decisive'):
         say.remark('None of these drives is decisive: another sensor or a higher speed is needed.')
+
+
+def _usual(parameters: Parameters) -> tuple[float, float]:
+    # Highest speed and yaw rate of a drive, of which no robot is asked more than of a Husky.
+    from lg_husky_sim.husky.by_hand import other_robot
+    from lg_husky_sim.husky.model_file import packaged
+    from lg_husky_sim.husky.robot_size import speeds_of
+    husky = packaged().parameters
+    forward, yaw, _ = speeds_of(parameters, husky) if other_robot(husky, parameters) else (
+        1.0, 1.0, 1.0)
+    return SPEED * min(1.0, forward), YAW * min(1.0, yaw)
 
 
 def _from_ids(text: str, robot: Path | None) -> tuple[Rival, Rival]:

@@ -19,7 +19,7 @@ from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, Ro
 @click.option('--seconds', type=click.FloatRange(min=0.0, min_open=True), metavar='SECONDS',
               help='Stop after this time; by default only on Ctrl-C.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
-              type=click.FloatRange(min=0.0), help='How long to look for a Husky.')
+              type=click.FloatRange(min=0.0), help='How long to look for a robot.')
 def command(bag: Path, preset: str | None, namespace: str | None, storage: str,
             seconds: float | None, wait: float) -> None:
     """

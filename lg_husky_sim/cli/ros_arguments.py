@@ -54,10 +54,10 @@ def robot_options(verb: _Verb) -> _Verb:
     """Give a verb the options that choose a robot."""
     namespace = click.option(
         '--namespace', metavar='NAME',
-        help='Namespace of the robot; by default that of the only Husky in the graph.')
+        help='Namespace of the robot; by default that of the only robot in the graph.')
     preset = click.option(
         '--preset', help='Names and types of a robot: paper, husky_ros1 or clearpath_jazzy; by '
-        'default those of the only Husky in the graph.')
+        'default those of the only robot in the graph.')
     return preset(namespace(verb))
 
 
@@ -74,7 +74,7 @@ def ros_tool(name: str, preset: str | None, namespace: str | None, *, wait: floa
     preset, namespace : str, optional
         From the command line.
     wait : float
-        How long to look for a Husky [s].
+        How long to look for a robot [s].
     **given
         Settings from the command line; None where not given.
 

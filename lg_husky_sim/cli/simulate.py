@@ -45,6 +45,7 @@ def command(
     /husky_velocity_controller/cmd_vel. A recording with gaps is driven segment by segment, each
     from the state that the robot was in.
     """
+    from lg_husky_sim.api.driving import fastest_side
     from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.husky.model_file import parse_settings
     from lg_husky_sim.recording import TopicMap
@@ -61,3 +62,8 @@ def command(
         f'y = {y:.3f} m, heading = {heading:.3f} rad',
         {'bag': str(out), 'duration_s': seconds, 'poses': len(driven.pose),
          'end': {'x_m': x, 'y_m': y, 'heading_rad': heading}})
+    wanted = fastest_side(driven.command, husky.parameters)
+    most = 1.0 / husky.parameters['command_gain']
+    if wanted > most:
+        say.remark(f'commands ask {wanted:.2f} m/s of a side, and the model has its whole supply '
+                   f'at {most:.2f} m/s (1/command_gain): it stays behind them')

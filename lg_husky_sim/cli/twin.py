@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 @click.option('--model', required=True, type=click.Path(path_type=Path), metavar='FILE.yaml',
               help='Model file, such as the model.yaml of a diagnosis.')
 @click.option('--plain', type=click.Path(path_type=Path), metavar='FILE.yaml',
-              help="Model to compare with; the Husky with the paper's parameters by default.")
+              help="Model to compare with; by default the Husky with the paper's parameters, or "
+              'of another robot the model without its effects.')
 @robot_options
 @click.option('--seconds', type=click.FloatRange(min=0.0, min_open=True), metavar='SECONDS',
               help='Stop after this time; by default only on Ctrl-C.')
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
               help='Odometry with the true pose of the robot (filtered, ground truth); the '
               'models are kept at it.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
-              type=click.FloatRange(min=0.0), help='How long to look for a Husky.')
+              type=click.FloatRange(min=0.0), help='How long to look for a robot.')
 def command(model: Path, plain: Path | None, preset: str | None, namespace: str | None,
             seconds: float | None, every: float, pose_topic: str | None, wait: float) -> None:
     """
@@ -47,11 +48,12 @@ def command(model: Path, plain: Path | None, preset: str | None, namespace: str 
     `lg_husky play REC` or another simulator.
     """
     from lg_husky_sim.husky.model import compile_model
-    from lg_husky_sim.husky.model_file import load_model
+    from lg_husky_sim.husky.model_file import load_model, nominal_of
     from lg_husky_sim.ros.tool import Ended
     from lg_husky_sim.ros.twin import NAME, Twin
 
-    files = {'plain': load_model(plain), 'model': load_model(model)}
+    own = load_model(model)
+    files = {'plain': nominal_of(own) if plain is None else load_model(plain), 'model': own}
     plants = {name: compile_model(one.structure).at(one.parameters)
               for name, one in files.items()}
     with ros_tool(NAME, preset, namespace, wait=wait) as (tool, settings):

@@ -11,7 +11,16 @@ from typing import Any
 
 from lg_husky_sim.comparison.traces import Predicted, traces_of
 from lg_husky_sim.evaluation.engine import engine_config
-from lg_husky_sim.evaluation.paper_case import BASE, CaseResult, GENETIC, NOMINAL, SQUARES
+from lg_husky_sim.evaluation.paper_case import (
+    BASE,
+    CaseResult,
+    GENETIC,
+    GIVEN,
+    NOMINAL,
+    SQUARES,
+)
+from lg_husky_sim.husky.by_hand import other_robot
+from lg_husky_sim.husky.model_file import packaged
 from lg_husky_sim.identification.paper import paper
 from lg_husky_sim.identification.report import convergence_chart
 from lg_husky_sim.reporting.data import ErrorRow, ErrorTable, Headline, ReportData
@@ -26,7 +35,8 @@ ABOUT = {
     GENETIC: "the paper's linear graph (LG), calibrated by its genetic algorithm",
     SQUARES: 'the same graph, calibrated by least squares',
     BASE: 'the graph with a wheel-speed loop and dead time, calibrated by least squares',
-    NOMINAL: 'the graph with the numbers that the paper prints'}
+    NOMINAL: 'the graph with the numbers that the paper prints',
+    GIVEN: 'the graph with the numbers of the model that is given'}
 
 
 def table(result: CaseResult) -> Table:
@@ -73,10 +83,12 @@ def parameter_table(result: CaseResult) -> Table:
     result : CaseResult
     """
     rows = []
+    fitted = result.fits[SQUARES].model.parameters
+    printed = {} if other_robot(packaged().parameters, fitted) else paper().search
     truth = engine_config()['truth'] if result.case.name == 'synthetic' else {}
     for one in result.fits[SQUARES].estimates:
         other = next(e for e in result.fits[GENETIC].estimates if e.name == one.name)
-        known = paper().search.get(one.name)
+        known = printed.get(one.name)
         rows.append((
             f'{one.name} [{one.unit}]', f'{other.value:.5g}',
             f'{one.value:.5g} ({one.low:.4g} to {one.high:.4g})',
@@ -169,7 +181,7 @@ def figures(result: CaseResult) -> tuple[tuple[Chart, ...], tuple[Drawing, ...]]
         Named fig13 to fig16; further manoeuvres go on counting.
     """
     case = result.case.name
-    shown = tuple(label for label in result.labels if label != NOMINAL)
+    shown = tuple(label for label in result.labels if label not in (NOMINAL, GIVEN))
     data = ReportData(case, Headline(case), shown, traces=traces_of(parts_of(result), shown))
     first = result.drives[0]
     drawings = [Drawing(

@@ -15,7 +15,7 @@ from lg_husky_sim.diagnosis.prediction_errors import assess, Assessment
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.evaluation.cases import Case
 from lg_husky_sim.husky.model import compile_model
-from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.husky.model_file import ModelFile, packaged
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.identification.estimate import estimate, STARTS
 from lg_husky_sim.identification.options import with_effects
@@ -27,6 +27,7 @@ GENETIC = 'LG, genetic algorithm'
 SQUARES = 'LG, least squares'
 BASE = 'LG and base, least squares'
 NOMINAL = "LG, paper's numbers"
+GIVEN = 'LG, given numbers'
 #: What a base with a speed loop does to a command; the paper's model has none of it.
 BASE_EFFECTS = ('speed_loop', 'command_latency')
 
@@ -127,7 +128,8 @@ def evaluate_case(case: Case, model: ModelFile, seed: int, starts: int = STARTS,
                           jobs=jobs, progress=tell)
     plants = {label: compile_model(fit.model.structure).at(fit.model.parameters)
               for label, fit in fits.items()}
-    plants[NOMINAL] = compile_model(model.structure).at(model.parameters)
+    papers = dict(model.parameters) == dict(packaged().parameters)
+    plants[NOMINAL if papers else GIVEN] = compile_model(model.structure).at(model.parameters)
     return CaseResult(case, fits, tuple(
         _drive(case, name, parts[name], plants, held_out=name != names[0]) for name in names))
 

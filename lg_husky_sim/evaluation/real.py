@@ -21,7 +21,7 @@ from lg_husky_sim.evaluation.baselines import (
 )
 from lg_husky_sim.evaluation.steps import alternate_steps, steps_of
 from lg_husky_sim.husky.model import compile_model
-from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.husky.model_file import ModelFile, packaged
 from lg_husky_sim.identification.estimate import estimate
 from lg_husky_sim.identification.noise import scales
 from lg_husky_sim.identification.options import with_effects
@@ -46,6 +46,8 @@ AVERAGE = 2.0
 AVERAGED = f'advance, mean over {AVERAGE:g} s'
 LABELS = ("paper's numbers", 'kinematic, effective track', 'first-order lag and delay',
           'graph, B, B_H, c refitted', 'graph with the base')
+#: In place of the first, where others than the paper's are given.
+GIVEN = 'given numbers'
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +125,8 @@ def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts
             {'loop_gain': 0.0, 'loop_integral': 0.0}), extended_model.about)
     extended = estimate(extended_model, parts, data=fitted, seed=seed, starts=starts, jobs=jobs,
                         free=free, baseline=model, progress=tell)
-    predictors = dict(zip(LABELS, (
+    papers = dict(model.parameters) == dict(packaged().parameters)
+    predictors = dict(zip(LABELS if papers else (GIVEN, *LABELS[1:]), (
         _graph(model), kinematic_predictor(fit_kinematics(fitted, model.parameters)),
         lag_predictor(fit_lags(fitted)), _graph(refit.model), _graph(extended.model)),
         strict=True))
@@ -187,9 +190,10 @@ def steps_table(result: StepsResult) -> Table:
     for place, name in enumerate(result.channels):
         words = name.replace(_channel(name), quantity(_channel(name)))
         rows.append((f'{words} [{UNITS[_channel(name)]}]',
-                     *(f'{result.errors[label][place]:.3f}' for label in LABELS),
+                     *(f'{errors[place]:.3f}' for errors in result.errors.values()),
                      f'{result.counts[place]} ({result.left_out[place]})'))
-    return Table((f'{result.recording}: held-out RMS', *LABELS, 'values (jumps left out)'), rows)
+    return Table((f'{result.recording}: held-out RMS', *result.errors,
+                  'values (jumps left out)'), rows)
 
 
 def steps_data(result: StepsResult) -> dict[str, Any]:

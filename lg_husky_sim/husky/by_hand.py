@@ -209,6 +209,12 @@ def _given(entry: Parameter, value: float, robot: RobotSize | None, number: Numb
         low=entry.low if same else None, high=entry.high if same else None)
 
 
+def other_robot(one: Parameters, other: Parameters) -> bool:
+    """Return whether wheels or track are farther from those of the first than their tolerance."""
+    return any(abs(other[name] - one[name]) > setting('other_robot') * one.entry(
+        name).tolerance * one[name] for name in ('wheel_radius', 'track'))
+
+
 def about_of(about: str, before: Parameters, after: Parameters) -> str:
     """
     Return the line that says of a model where it comes from, after numbers are given.
@@ -229,8 +235,7 @@ def about_of(about: str, before: Parameters, after: Parameters) -> str:
            if (e.value, e.source) != (old.value, old.source)]
     if not _said(new):
         return about
-    if any(abs(after[name] - before[name]) > setting('other_robot') * before.entry(
-            name).tolerance * before[name] for name in ('wheel_radius', 'track')):
+    if other_robot(before, after):
         return (f'robot of {after["mass"]:g} kg, wheel radius {after["wheel_radius"]:g} m, '
                 f'track {after["track"]:g} m; {_said(after.entries)}')
     told = _said(before.entries)

@@ -11,7 +11,7 @@ from pathlib import Path
 import tempfile
 
 from lg_husky_sim.errors import LgHuskyError, ModelFileError, ParameterError
-from lg_husky_sim.husky.by_hand import about_of, Number, with_numbers
+from lg_husky_sim.husky.by_hand import about_of, Number, other_robot, with_numbers
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.model_reader import read_model
 from lg_husky_sim.husky.model_schema import SCHEMA
@@ -123,6 +123,15 @@ def load_model(path: str | os.PathLike[str] | None = None) -> ModelFile:
         raise ModelFileError(f'{place}: {error}') from error
     ours = place == default_model_path()
     return model_from_data(data, place.name if ours else str(place), complete=ours)
+
+
+def nominal_of(model: ModelFile) -> ModelFile:
+    """Return what a model is compared with: the packaged Husky, or another robot's own graph."""
+    usual = packaged()
+    if not other_robot(usual.parameters, model.parameters):
+        return usual
+    return replace(model, structure=Structure(model.structure.drivetrain),
+                   about=f'{model.about}, without effects'.lstrip(', '))
 
 
 def apply_settings(model: ModelFile, settings: Mapping[str, float | Number],

@@ -13,6 +13,7 @@ from typing import Any
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.resources import config_path
+from lg_husky_sim.ros.wheel_odometry import assumed_for
 from lg_husky_sim.yaml_files import read_yaml, shown
 
 SCHEMA = 'lg_husky_sim/presets/1'
@@ -134,12 +135,12 @@ TABLE: tuple[Setting, ...] = (
     Setting('max_yaw_acceleration', float, 'limit of the commanded yaw acceleration; 0: '
                                            'none', 'rad/s²', 0.0, 1000.0,
             live=True),
-    Setting('wheel_radius', float, 'wheel radius that the wheel odometry assumes', 'm', 0.001,
-            10.0),
-    Setting('wheel_separation', float, 'track that the wheel odometry assumes', 'm', 0.001, 10.0),
+    Setting('wheel_radius', float, 'wheel radius that the wheel odometry assumes; by default that '
+            'of the model, where it is of another robot than the Husky', 'm', 0.001, 10.0),
+    Setting('wheel_separation', float, 'track that the wheel odometry assumes; likewise', 'm',
+            0.001, 10.0),
     Setting('wheel_separation_multiplier', float, 'factor on wheel_separation, as a skid-steer '
-                                                  'robot slips', '',
-            0.01, 100.0),
+            'robot slips; likewise, twice turn_ratio over track', '', 0.01, 100.0),
     Setting('odometry_window', int, "wheel velocities averaged in the odometry's twist", 'steps',
             1, 1000),
     Setting('odometry_topic', str, "wheel odometry, as the robot's controller computes it"),
@@ -392,4 +393,5 @@ def make_settings(values: Mapping[str, object] | None = None, **more: object) ->
     given = {**(values or {}), **more}
     check_names(given)
     preset = given.get('preset', DEFAULT_PRESET)
-    return Settings(**(preset_values(BY_NAME['preset'].checked(preset)) | given))
+    values = preset_values(BY_NAME['preset'].checked(preset))
+    return Settings(**(values | assumed_for(given.get('model')) | given))

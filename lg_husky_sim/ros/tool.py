@@ -263,7 +263,7 @@ def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = N
     Return preset and namespace of the robot to serve.
 
     What the command line says counts, then what ROS arguments say, then ``ROS_NAMESPACE``, then
-    the only Husky in the graph.
+    the only robot in the graph.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = N
     preset, namespace : str, optional
         From the command line.
     wait : float
-        How long to look for a Husky [s].
+        How long to look for a robot [s].
 
     Raises
     ------
@@ -296,7 +296,7 @@ def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = N
         elif preset is None:
             where = f'below {place} ' if place else ''
             raise CommandError(
-                f'no Husky is {where}in the graph ({api.describe_backend()}) after {wait:g} s; '
+                f'no robot is {where}in the graph ({api.describe_backend()}) after {wait:g} s; '
                 f'start it, or name its topics: --preset {DEFAULT_PRESET} or '
                 f'{", ".join(BY_NAME["preset"].choices[1:])}')
     return preset, None if remapped and not namespace else place

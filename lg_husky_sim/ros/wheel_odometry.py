@@ -7,7 +7,37 @@ from __future__ import annotations
 from collections import deque
 import math
 
+from lg_husky_sim.errors import LgHuskyError
+from lg_husky_sim.husky.by_hand import other_robot
+from lg_husky_sim.husky.model_file import load_model, packaged
 from lg_husky_sim.signals import BodyTwist, Pose
+
+
+def assumed_for(model: object) -> dict[str, float]:
+    """
+    Return what the base of another robot takes for its wheels; a preset's are a Husky's.
+
+    Parameters
+    ----------
+    model : object
+        Path of a model file, as a setting holds it.
+
+    Returns
+    -------
+    dict of str to float
+        Settings by name; none for a Husky, or for a file that cannot be read, of which the node
+        says so when it loads it.
+    """
+    if not isinstance(model, str) or not model:
+        return {}
+    try:
+        numbers = load_model(model).parameters
+    except (LgHuskyError, OSError):
+        return {}
+    if not other_robot(packaged().parameters, numbers):
+        return {}
+    return {'wheel_radius': numbers['wheel_radius'], 'wheel_separation': numbers['track'],
+            'wheel_separation_multiplier': 2.0 * numbers['turn_ratio'] / numbers['track']}
 
 
 class WheelOdometry:

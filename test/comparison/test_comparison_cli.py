@@ -110,6 +110,15 @@ def test_simulate_is_the_same_bit_for_bit(bag: Path, capsys: Any) -> None:
     assert (again / 'turn.mcap').read_bytes() == (bag / 'turn.mcap').read_bytes()
 
 
+def test_simulate_says_where_a_slower_robot_stays_behind(tmp_path: Path, capsys: Any) -> None:
+    for number, (gain, said) in enumerate(((0.8961, False), (1.6, True))):
+        assert run(['simulate', '--commands', 'stop_and_go', '--set', f'command_gain={gain}',
+                    '--out', str(tmp_path / str(number))]) == 0
+        printed = capsys.readouterr().out
+        assert ('commands ask 0.90 m/s of a side, and the model has its whole supply at 0.62 m/s'
+                in printed) is said
+
+
 @pytest.mark.parametrize(('arguments', 'message'), [
     (['--commands', 'circel', '--out', 'x'], "no manoeuvre 'circel'; did you mean circle?"),
     (['--commands', 'no/bag', '--out', 'x'], 'no recording or command script no/bag'),

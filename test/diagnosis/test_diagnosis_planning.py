@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from lg_husky_sim.api.robots import Husky
 from lg_husky_sim.cli.main import run
 from lg_husky_sim.diagnosis.planning import drives, imitated, named_drive, plan, typical
 from lg_husky_sim.errors import ParameterError
@@ -70,6 +71,18 @@ def test_command_writes_a_script_that_can_be_driven(tmp_path: Path, capsys: Any)
     evidence = [row['evidence_nats'] for row in rows]
     assert len(rows) > 3
     assert evidence == sorted(evidence, reverse=True)
+
+
+def test_a_slower_robot_is_asked_for_less(tmp_path: Path) -> None:
+    """A Husky has its whole supply at 1.12 m/s, this one at 0.4 m/s."""
+    robot, out = tmp_path / 'robot.yaml', tmp_path / 'script.yaml'
+    Husky(mass=6.0, wheel_radius=0.05, track=0.24, turn_ratio=0.22, command_gain=2.5).save(robot)
+    asked = ['plan-drive', '--effects', 'gyro_bias,payload', '--robot', str(robot), '--out',
+             str(out)]
+    assert run(asked) == 0
+    assert 0.0 < np.max(np.abs(load_manoeuvre(out).commands().column('forward'))) < 0.3
+    assert run([*asked, '--max-speed', '4.0']) == 0
+    assert np.max(np.abs(load_manoeuvre(out).commands().column('forward'))) > 1.0
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 import sys
 
+from lg_husky_sim.api.robots import Husky
 from lg_husky_sim.cli.main import run
 from lg_husky_sim.evaluation import session
 from lg_husky_sim.evaluation.cases import MANOEUVRES, synthetic_case
@@ -52,3 +53,41 @@ def test_the_synthetic_case_needs_no_engine(monkeypatch: pytest.MonkeyPatch) -> 
     case = synthetic_case(0)
     assert list(case.recordings) == list(MANOEUVRES)
     assert case.rivals == {}
+
+
+@pytest.fixture(scope='module')
+def rover(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a robot of 6 kg: its model, and two recordings of it."""
+    folder = tmp_path_factory.mktemp('rover')
+    robot = Husky(about='our rover', mass=6.0, yaw_inertia=0.08, wheel_radius=0.05, track=0.24,
+                  wheelbase=0.18, wheel_inertia=8e-4, motor_resistance=1.8, torque_constant=0.02,
+                  gear_ratio=30.0, supply_voltage=12.0, wheel_damping=0.02, yaw_damping=0.15,
+                  turn_ratio=0.22)
+    robot.save(folder / 'rover.yaml')
+    real = robot.replacing(wheel_damping=0.05, yaw_damping=0.4)
+    for name in ('circle', 'spin'):
+        real.simulate(name).save(folder / name)
+    return folder
+
+
+@pytest.mark.parametrize('cases', [(), ('--case', 'synthetic')])
+def test_the_built_in_cases_are_no_other_robot(
+        rover: Path, cases: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(['evaluate', '--robot', str(rover / 'rover.yaml'), '--out', str(rover / 'none'),
+                *cases]) == 1
+    said = capsys.readouterr().err
+    assert 'built-in cases are a Husky, and the model is none (wheel radius 0.05 m' in said
+    assert '--calibrate REC' in said
+    assert not (rover / 'none').exists()
+
+
+def test_another_robot_is_not_compared_with_the_papers_numbers(rover: Path) -> None:
+    out = rover / 'out'
+    assert run(['evaluate', '--robot', str(rover / 'rover.yaml'), '--out', str(out),
+                '--calibrate', str(rover / 'circle'), '--held-out', str(rover / 'spin'),
+                '--starts', '1']) == 0
+    text = (out / 'evaluation.txt').read_text(encoding='utf-8')
+    assert 'LG, given numbers' in text
+    assert "paper's numbers" not in text
+    (row,) = [line.split() for line in text.splitlines() if line.startswith('wheel_damping [')]
+    assert row[-1] == '–'

@@ -10,7 +10,7 @@ from typing import Any, cast
 import lg_husky_sim as lg
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.by_hand import setting
-from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.husky.model_file import load_model, nominal_of
 import numpy as np
 import pytest
 
@@ -137,3 +137,14 @@ def test_a_model_says_where_it_comes_from() -> None:
     assert other.replacing(about='ours', mass=6.5).model.about == 'ours'
     assert lg.Husky(other.replacing(about='ours')).replacing(wheel_damping=0.1).model.about == (
         'ours; wheel_damping set by hand')
+
+
+def test_a_twin_is_compared_with_a_model_of_its_own_robot() -> None:
+    """The packaged Husky beside a robot of 6 kg says nothing."""
+    husky = lg.Husky(wheel_damping=0.7).with_effect('payload')
+    assert nominal_of(husky.model) == load_model()
+    small = lg.Husky(about='ours', **SMALL)
+    plain = nominal_of(small.with_effect('payload').model)
+    assert plain.structure == small.model.structure
+    assert plain.parameters['mass'] == 6.0
+    assert plain.about == 'ours, without effects'

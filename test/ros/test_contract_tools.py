@@ -259,7 +259,7 @@ def test_a_tool_without_a_robot_says_so(probe: Probe, tmp_path: Path) -> None:
     lonely = run('record', tmp_path / 'bag', '--wait', '0.5', '--namespace', '/nobody')
     _, said = lonely.communicate(timeout=120.0)
     assert lonely.returncode == 1
-    assert said.startswith('error: no Husky is below /nobody in the graph (backend ')
+    assert said.startswith('error: no robot is below /nobody in the graph (backend ')
     assert not (tmp_path / 'bag').exists()
     empty = run('record', tmp_path / 'bag', '--preset', 'husky_ros1', '--namespace', '/nobody',
                 '--seconds', '0.5')

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from pathlib import Path
 
+from lg_husky_sim.api.robots import Husky
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.ros.settings import BY_NAME, make_settings, preset_values, Settings, TABLE
@@ -55,6 +57,21 @@ def test_every_mistake_says_what_is_allowed(values: dict[str, object], message: 
     """T17: name, value and range stand in the message."""
     with pytest.raises(SettingsError, match=message):
         make_settings(values)
+
+
+def test_the_odometry_of_another_robot_assumes_its_wheels(tmp_path: Path) -> None:
+    """Those of a preset are a Husky's; what is given goes before both."""
+    small = tmp_path / 'small.yaml'
+    Husky(mass=6.0, wheel_radius=0.05, track=0.24, turn_ratio=0.18).save(small)
+    numbers = make_settings(model=str(small), preset='clearpath_jazzy', wheel_separation=0.25)
+    assert (numbers.wheel_radius, numbers.wheel_separation) == (0.05, 0.25)
+    assert numbers.wheel_separation_multiplier == pytest.approx(1.5)
+    fitted = tmp_path / 'fitted.yaml'
+    Husky(wheel_radius=0.16, wheel_damping=0.7).save(fitted)
+    for path in (str(fitted), 'nowhere.yaml', ''):
+        same = make_settings(model=path)
+        assert (same.wheel_radius, same.wheel_separation, same.wheel_separation_multiplier) == (
+            0.1651, 0.5708, 1.875)
 
 
 def test_sensor_rates_become_steps() -> None:
