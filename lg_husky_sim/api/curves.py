@@ -110,15 +110,20 @@ class StepResponse:
                             index=pd.Index(self.times.copy(), name='time'))
 
     def table(self) -> Table:
-        """Return final value and peak of each output, rise and settling time and overshoot."""
-        peaks = np.abs(self.values).argmax(axis=0)
+        """Return final value, rise and settling time, overshoot and peak of each output."""
         return Table('', ('output', 'unit', 'final value', 'rise time 10-90 % [s]',
                           'settling time 2 % [s]', 'overshoot [%]', 'peak', 'peak time [s]'),
                      tuple((name, unit, None if np.isnan(final) else float(final),
-                            *self._shape(at), float(self.values[peak, at]),
-                            float(self.times[peak]))
-                           for at, (name, unit, final, peak) in enumerate(zip(
-                               self.names, self.units, self.final, peaks, strict=True))))
+                            *self._shape(at), *self._peak(at))
+                           for at, (name, unit, final) in enumerate(zip(
+                               self.names, self.units, self.final, strict=True))))
+
+    def _peak(self, at: int) -> tuple[float | None, float | None]:
+        """Return the largest value and its time; None where it is the last one, and no peak."""
+        peak = int(np.abs(self.values[:, at]).argmax())
+        if peak == len(self.times) - 1 or not self.values[peak, at]:
+            return None, None
+        return float(self.values[peak, at]), float(self.times[peak])
 
     def _shape(self, at: int) -> tuple[float | None, float | None, float | None]:
         """Return rise time, settling time and overshoot of an output; None where not seen."""

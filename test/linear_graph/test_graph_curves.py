@@ -91,6 +91,7 @@ def test_what_does_not_settle_has_no_final_value() -> None:
     assert found.times[-1] == pytest.approx(20.0)       # five periods of pi, and a round number
     short = lg.graph(MOTOR).step([0.0, 0.01, 0.02])
     assert short.table().rows[0][2:5] == (pytest.approx(19.6078, rel=1e-5), None, None)
+    assert short.table().rows[0][6:] == (None, None)    # it still rises at the end
 
 
 def test_times_and_rates_by_default_show_all_of_it() -> None:
@@ -185,6 +186,23 @@ def test_bode_is_drawn_over_a_logarithmic_frequency() -> None:
     lg.graph(OSCILLATOR).bode([0.001, 0.0011]).plot(constant)
     assert np.diff(constant[1].get_ylim()) >= 45.0
     assert constant[0].get_ylabel() == 'gain [dB]'      # newtons over newtons
+
+
+def test_an_output_that_nothing_reaches_is_zero_and_not_rounding() -> None:
+    graph = lg.graph("""
+        elements:
+          V_1: {is: voltage source, from: a}
+          R_1: {is: resistor, from: a, value: 3}
+          V_2: {is: voltage source, from: d}
+          R_2: {is: resistor, from: d, to: e, value: 2}
+          C_2: {is: capacitor, from: e, value: 3}
+        outputs: [V(C_2)]
+        """)
+    found = graph.bode([0.1, 1.0], source='V_1')
+    assert (found.values.tolist(), found.gain.tolist()) == ([0.0, 0.0], [-np.inf, -np.inf])
+    found.plot(axes(2))
+    graph.step(source='V_1').plot(axes(1))
+    assert graph.step(source='V_1').table().rows[0][2:6] == (0.0, None, None, None)
 
 
 def test_two_different_curves_share_no_title() -> None:
