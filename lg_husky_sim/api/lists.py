@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+from lg_husky_sim.api.recordings import PathLike
+from lg_husky_sim.api.robots import as_husky, Husky
 from lg_husky_sim.api.tables import Table
 from lg_husky_sim.husky.effects import catalogue
 from lg_husky_sim.manoeuvres import builtin_manoeuvres
 
 
-def list_effects(name: str | None = None) -> Table:
+def list_effects(name: str | None = None, model: PathLike | Husky | None = None) -> Table:
     """
     List the catalogue of effects, or the parameters of one.
 
@@ -17,6 +19,8 @@ def list_effects(name: str | None = None) -> Table:
     ----------
     name : str, optional
         Id of an effect.
+    model : path-like or Husky, optional
+        Of the robot whose sizes the parameters have; the packaged Husky by default.
 
     Returns
     -------
@@ -33,11 +37,12 @@ def list_effects(name: str | None = None) -> Table:
             (kind.id, kind.subsystem.value, kind.title, _words(kind.sides), _words(kind.shapes))
             for kind in catalogue().values()))
     from lg_husky_sim.husky.effects import effect_kind
-    kind = effect_kind(name)
+    kind, robot = effect_kind(name), as_husky(model).model.in_proportion().structure.robot
     return Table(f'{kind.id}: {kind.title}',
                  ('parameter', 'unit', 'typical', 'lower', 'upper', 'estimated', 'source'),
                  tuple((p.name, p.unit, p.starts[0], p.lower, p.upper,
-                        'no' if p.fixed else 'yes', p.source) for p in kind.parameters))
+                        'no' if p.fixed else 'yes', p.source)
+                       for p in (one.of(robot) for one in kind.parameters)))
 
 
 def _words(names: tuple[str, ...]) -> str:

@@ -4,17 +4,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
-from lg_husky_sim.cli.common import EFFECT, Output, spoken
+from lg_husky_sim.cli.common import EFFECT, model_option, Output, spoken
 
 
 @click.command(short_help='List the catalogue of effects, or the parameters of one.')
 @click.argument('effect', required=False, metavar='[ID]', type=EFFECT)
+@model_option('--robot', '--model', 'robot')
 @spoken()
-def command(effect: str | None, say: Output) -> None:
+def command(effect: str | None, robot: Path | None, say: Output) -> None:
     """List the effects that a model can have, or the parameters of one.
 
-    What diagnose looks for are these, but for static_friction and tyre_windup.
+    Sizes are those of the robot. What diagnose looks for are these, but for static_friction and
+    tyre_windup.
     """
     from lg_husky_sim.api.lists import list_effects
-    say.result(list_effects(effect))
+    say.result(list_effects(effect, robot))

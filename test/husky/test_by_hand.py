@@ -7,10 +7,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, cast
 
+from click.testing import CliRunner
 import lg_husky_sim as lg
-from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.cli.main import cli
+from lg_husky_sim.errors import ParameterError, SettingsError
 from lg_husky_sim.husky.by_hand import setting
 from lg_husky_sim.husky.model_file import load_model, nominal_of
+from lg_husky_sim.resources import config_path
+from lg_husky_sim.yaml_files import read_yaml
 import numpy as np
 import pytest
 
@@ -137,6 +141,26 @@ def test_a_model_says_where_it_comes_from() -> None:
     assert other.replacing(about='ours', mass=6.5).model.about == 'ours'
     assert lg.Husky(other.replacing(about='ours')).replacing(wheel_damping=0.1).model.about == (
         'ours; wheel_damping set by hand')
+
+
+def test_sizes_of_effects_are_listed_for_a_robot(tmp_path: Path) -> None:
+    heavy = lg.Husky(mass=10.0 * 48.39)
+    heavy.save(tmp_path / 'heavy.yaml')
+    usual, own = lg.list_effects('payload'), lg.list_effects('payload', heavy)
+    assert own.rows[0][2] == pytest.approx(10.0 * cast('float', usual.rows[0][2]))
+    printed = CliRunner().invoke(
+        cli, ['effects', 'payload', '--robot', str(tmp_path / 'heavy.yaml')])
+    assert printed.output == f'{own}\n'
+    assert lg.list_effects('payload', lg.Husky()).rows == usual.rows
+
+
+@pytest.mark.parametrize('name', ['reach', 'other_robot'])
+def test_numbers_of_parameters_have_unit_meaning_and_source(name: str) -> None:
+    entry = read_yaml(config_path('parameters.yaml'), SettingsError)['given'][name]
+    assert setting(name) == entry['value']
+    assert entry['unit'] == '1'
+    assert len(entry['meaning']) > 20
+    assert entry['source']
 
 
 def test_a_twin_is_compared_with_a_model_of_its_own_robot() -> None:
