@@ -108,6 +108,9 @@ class EffectParameter:
         Of a delay: which jitter of a log it may come of, by the effect's shape.
     delays : mapping of str to str
         Of a delay that is always there: that of a log which does the same, by the effect's shape.
+    limits : str
+        What it is the largest size of: 'voltage' or 'current' of a motor, or the commanded
+        'forward' speed or 'yaw' rate; empty for no limit.
     """
 
     name: str
@@ -123,6 +126,7 @@ class EffectParameter:
     linear: bool = False
     jitter: Mapping[str, str] = field(default_factory=dict)
     delays: Mapping[str, str] = field(default_factory=dict)
+    limits: str = ''
 
     def of(self, robot: RobotSize) -> EffectParameter:
         """Return it for a robot of another size: bounds and sizes are in proportion."""
@@ -322,7 +326,7 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
                         bool(p.get('fixed', False)), float(p.get('negligible', 0.0)),
                         float(p.get('none_from', math.inf)), tuple(p.get('shapes', ())),
                         bool(p.get('linear', False)), dict(p.get('jitter', {})),
-                        dict(p.get('delays', {})))
+                        dict(p.get('delays', {})), str(p.get('limits', '')))
         for key, p in entry['parameters'].items())
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),

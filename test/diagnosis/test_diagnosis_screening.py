@@ -16,6 +16,7 @@ from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
 from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.selection.rounds import attempt, numbers_of
 from lg_husky_sim.diagnosis.selection.screening import look, problems_of, Projection
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Effect
@@ -56,6 +57,31 @@ def test_looks_go_on_below_the_weakest_size(base: tuple[Evidence, Fit]) -> None:
     found = look(evidence, fit, pool)
     assert found[0].hypothesis.label == 'command_slew:both'
     assert found[0].gain > 20.0
+
+
+def test_a_limit_that_acts_for_moments_is_seen(record: Callable[..., Recording]) -> None:
+    # Its errors are many times the noise and weigh next to nothing; the next stronger size from
+    # which a look begins clips nearly all the time.
+    model, effect = load_model(), Effect('voltage_saturation')
+    volts = model.parameters['command_gain'] * model.parameters['supply_voltage']
+    steps = [(2.0, 0.0, 0.0), *((duration, voltage / volts, yaw) for duration, voltage, yaw in (
+        (2.0, 8.0, 0.0), (2.0, 20.9, 0.0), (2.0, 13.0, 0.3), (2.0, -20.9, 0.0), (0.6, -22.4, 0.0),
+        (2.0, -13.0, -0.5), (2.0, 20.9, 0.0), (0.4, 22.4, 0.0), (2.0, 17.0, 0.1),
+        (2.0, -20.9, 0.0), (2.0, 5.0, -0.4)))]
+    plant = compile_model(model.structure.with_effect(effect)).at(
+        model.parameters.with_entries(*entries_of(effect, {'clip_voltage': 21.4})))
+    drives = drives_of([record('clipped', plant, steps, 3)])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['clipped'], start, first_guess(drives), pool)
+        fit = evidence.fit(start, rounds=3)
+        found = look(evidence, fit, [h for h in hypotheses(
+            fit.point.structure) if h.effect == effect])
+        assert found[0].gain > 20.0
+        fitted = attempt(evidence, fit, found[0].hypothesis, [(fit.point, found[0].numbers)])
+    assert fitted is not None
+    assert numbers_of(fitted)['clip_voltage'] == pytest.approx(21.4, abs=0.1)
 
 
 def test_products_are_those_of_columns_without_what_the_base_explains(

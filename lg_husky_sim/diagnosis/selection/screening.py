@@ -5,7 +5,13 @@ A first look at every hypothesis: one simulation a start, the numbers of the bas
 
 With the whitened innovations e of a fit, its Jacobian J and the change c that an effect makes of
 the simulated readings, the gain of ``c`` is what the linear problem ``e = J d + c s`` with the
-priors of the base loses in cost.
+priors of the base loses in cost, each innovation with the weight that its size leaves it.
+
+Innovations far beyond their noise have next to none: what acts for moments (a limit just below
+what a robot reaches) has no weight where it acts. The gain is at least what the cost itself loses,
+the numbers of the base as they are, by s from a few reweighted steps::
+
+    s <- argmin sum w (e - c s)^2,  w = (nu + 1) / (nu + (e - c s)^2)
 """
 
 from __future__ import annotations
@@ -23,6 +29,7 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     Numbers,
     proportional,
 )
+from lg_husky_sim.diagnosis.selection.reached import limits_reached, reached_of
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.signals import FloatArray
@@ -73,6 +80,12 @@ class Projection:
         self._weights = root * root
         self._base = np.ascontiguousarray((base[:count] * root[:, None]).T)
         self._target = root * target[:count]
+
+    @property
+    def target(self) -> FloatArray:
+        """Weighted innovations that are left, shape (n,); times columns they are slopes."""
+        found: FloatArray = self._target
+        return found
 
     def problem(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
@@ -182,6 +195,50 @@ def gain_of(normal: FloatArray, slope: FloatArray, limits: Sequence[tuple[float,
     return float(kept @ slope - 0.5 * kept @ normal @ kept), kept
 
 
+def settled(whitened: FloatArray, columns: FloatArray, start: FloatArray,
+            limits: Sequence[tuple[float, float]]) -> tuple[float, FloatArray]:
+    """
+    Return what the cost itself loses by columns, and their coefficients.
+
+    Parameters
+    ----------
+    whitened : numpy.ndarray, shape (n,)
+        Innovations of the base, whose numbers stay as they are.
+    columns : numpy.ndarray, shape (n, m)
+        Whitened changes.
+    start : numpy.ndarray, shape (m,)
+    limits : sequence of (float, float)
+        Of each coefficient, see :func:`limits_of`.
+
+    Returns
+    -------
+    float
+        [nats]
+    numpy.ndarray, shape (m,)
+    """
+    nu = setting('student')
+    low, high = np.transpose(limits)
+
+    def cost(left: FloatArray) -> float:
+        return float(np.sum(0.5 * (nu + 1.0) * np.log1p(left * left / nu)))
+    before, gain, best = cost(whitened), 0.0, start
+    own = start
+    for _ in range(int(setting('reweighted_looks'))):
+        left = whitened - columns @ own
+        promised = before - cost(left)
+        if promised > gain:
+            gain, best = promised, own
+        weight = (nu + 1.0) / (nu + left * left)
+        normal = normal_matrix(columns, weight)
+        size = np.sqrt(np.maximum(np.diag(normal), 0.0))
+        if not np.all(np.isfinite(size)) or np.any(size <= setting('rounding')):
+            break
+        own = np.clip(np.linalg.solve(
+            normal / np.outer(size, size) + 1e-9 * np.eye(size.size),
+            (weight * whitened) @ columns / size) / size, low, high)
+    return gain, best
+
+
 def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]:
     """
     Look at every hypothesis once.
@@ -199,6 +256,7 @@ def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]
         The best start of each, in the order of the linear gain.
     """
     projection = Projection(fit)
+    reached = reached_of(evidence, fit)
 
     def tried(hypothesis: Hypothesis, group: Sequence[Numbers]) -> _Rung | None:
         columns = []
@@ -211,8 +269,14 @@ def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]
         stacked = [np.column_stack(one) for one in zip(*columns, strict=True)]
         if not all(np.all(np.isfinite(one)) for one in stacked):
             return None
-        normal, slope = projection.problem(evidence.whiten(stacked))
-        gain, coefficients = gain_of(normal, slope, limits_of(hypothesis, group))
+        changed = evidence.whiten(stacked)
+        normal, slope = projection.problem(changed)
+        limits = limits_of(hypothesis, group)
+        gain, coefficients = gain_of(normal, slope, limits)
+        for start in (coefficients, np.ones(len(coefficients))):
+            own, there = settled(fit.whitened, changed, start, limits)
+            if own > gain:
+                gain, coefficients = own, there
         return _Rung(group, normal, slope, gain, coefficients)
 
     def seen(hypothesis: Hypothesis) -> Look | None:
@@ -225,6 +289,9 @@ def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]
                 one := tried(hypothesis, group)) is not None and (
                     one.strength < rungs[0].strength):
             rungs.insert(0, one)
+        for group in limits_reached(hypothesis, reached):
+            if (one := tried(hypothesis, group)) is not None:
+                rungs.append(one)
         best = max(rungs, key=lambda one: one.gain)
         return Look(hypothesis, begin(hypothesis, best.group, best.coefficients), best.gain)
     found = [one for one in evidence.pool.map(seen, pool) if one is not None]
