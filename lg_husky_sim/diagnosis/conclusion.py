@@ -8,28 +8,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import math
 
-from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
 from lg_husky_sim.diagnosis.decision.confidence import confidence, Features
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.products import normal_matrix
 from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import neutral_of
+from lg_husky_sim.diagnosis.hypotheses.lines import Line
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, Effort, efforts
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts, READINGS
 from lg_husky_sim.diagnosis.localisation import Missing, where_it_shows
-from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Rivalry, Verdict
-from lg_husky_sim.diagnosis.selection.rounds import is_negligible, Round
+from lg_husky_sim.diagnosis.nameless import felt, needed_evidence
+from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Verdict
+from lg_husky_sim.diagnosis.rivals import rivals_of
+from lg_husky_sim.diagnosis.selection.rounds import is_negligible
 from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.selection.ties import gains_of, is_near
 from lg_husky_sim.diagnosis.separation import separated_by
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import sentence
 from lg_husky_sim.errors import LgHuskyError
-from lg_husky_sim.husky.effects import descriptions, Effect
+from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.network import on_side
 from lg_husky_sim.husky.parameters import Parameters
-from lg_husky_sim.husky.robot_size import RobotSize
 import numpy as np
 
 #: Parameter whose sign says to which side an effect acts: positive to the left.
@@ -129,18 +130,6 @@ def _estimate(unknown: Unknown, place: float, half: float, unit: str) -> Estimat
                     unknown.value(high))
 
 
-def rivals_of(one: Round) -> tuple[Rivalry, ...]:
-    """Return what else was tried in a round, each effect once, best first."""
-    best: dict[str, Rivalry] = {}
-    named = one.tried[0].hypothesis.effect.id if one.adopted else ''
-    for tried in one.tried:
-        effect = tried.hypothesis.effect
-        if effect.id != named and (effect.id not in best
-                                   or tried.gain > best[effect.id].held_out_gain):
-            best[effect.id] = Rivalry(effect.id, effect.side, max(tried.gain, 0.0))
-    return tuple(sorted(best.values(), key=lambda r: -r.held_out_gain))
-
-
 def indistinguishable(search: Search) -> tuple[Indistinguishable, ...]:
     """Return the sets of effects between which the data do not decide."""
     found = []
@@ -183,72 +172,6 @@ def findings(search: Search) -> tuple[Finding, ...]:
             sentence(effect, onset, numbers, regime,
                      undetermined=undetermined(search.final, names))))
     return tuple(sorted(found, key=lambda f: -f.held_out_gain))
-
-
-def needed_evidence(rest: Sequence[Effort], free: Sequence[Missing]) -> float:
-    """
-    Return the log evidence beyond which something without a name is missing [nats].
-
-    Parameters
-    ----------
-    rest : sequence of Effort
-    free : sequence of Missing
-        Each balance is looked at for bursts.
-    """
-    return evidence_beyond_chance(len(rest) + len({m.balance for m in free}))
-
-
-def remaining(search: Search) -> Search:
-    """
-    Return a search under the noise that is fair to what it leaves.
-
-    Parameters
-    ----------
-    search : Search
-
-    Returns
-    -------
-    Search
-        With disturbances that may last as long as a robot stays at a place, where those of the
-        search last as long as they may: what a floor does for seconds is no unknown effort.
-    """
-    longest = setting('longest_time')
-    times = [value for name, value in search.evidence.noise.values.items()
-             if name.endswith('_time')]
-    if not math.isclose(max(times), longest):
-        return search
-    evidence = search.evidence.renoised(search.final, longest='longest_memory')
-    final = evidence.fit(search.final.point, search.final.slopes,
-                         rounds=int(setting('whole_rounds')))
-    return replace(search, evidence=evidence, final=final)
-
-
-def felt(rest: Sequence[Effort], free: Sequence[Missing], robot: RobotSize
-         ) -> tuple[tuple[Effort, ...], tuple[Missing, ...]]:
-    """
-    Return the efforts that are not negligible.
-
-    Parameters
-    ----------
-    rest : sequence of Effort
-    free : sequence of Missing
-        Of all drives.
-    robot : RobotSize
-
-    Returns
-    -------
-    tuple of Effort
-    tuple of Missing
-        Those that somewhere reach the size from which their description in effects.yaml counts.
-    """
-    least = {balance: next(p.of(robot).negligible for p in descriptions()[name].parameters
-                           if p.negligible)
-             for balance, (_, name, *_) in BALANCES.items()}
-    largest = dict.fromkeys(BALANCES, 0.0)
-    for one in free:
-        largest[one.balance] = max(largest[one.balance], float(np.max(np.abs(one.values))))
-    return (tuple(e for e in rest if e.largest >= least[e.balance]),
-            tuple(m for m in free if largest[m.balance] >= least[m.balance]))
 
 
 @dataclass(frozen=True)
@@ -299,16 +222,18 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
 
 def _is_its_form(search: Search, rest: Sequence[Effort], told: float) -> bool:
     # Whether what is left is a law of another form: at the balance, and over the quantity, where
-    # the effects explain most, and most of what there is. An effort that remembers is no form.
+    # the effects explain most, and most of what there is. One that remembers or repeats is none,
+    # and the factor and the offset of a sensor have only one.
     left = {(one.balance, one.argument): one.explained for one in rest}
     most = max(rest, key=lambda one: one.explained, default=None)
-    if most is None or most.argument in PAST:
+    if (most is None or most.argument in PAST or most.balance in READINGS
+            or isinstance(most, Line)):
         return False
     whole = {(one.balance, one.argument): one.explained for one in efforts(
         search.evidence, search.evidence.fit(search.plain.point))}
     best = max(whole, key=lambda place: whole[place] - left.get(place, 0.0))
     return best == (most.balance, most.argument) and (
-        told > setting('unknown_share') * whole[best])
+        told > setting('form_share') * whole[best])
 
 
 def _sure(verdict: Verdict, features: Features) -> Answer:
@@ -340,31 +265,3 @@ def explained_by(search: Search) -> float:
         plain = evidence.fit(inside).point
     return (evidence.cost(evidence.residuals(evidence.predict(plain)), plain)
             - search.final.cost)
-
-
-def unknown_finding(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> Finding:
-    """Return what is missing without a name, by its best description."""
-    rest, free = felt(rest, free, search.final.point.structure.robot)
-    smooth = max(rest, key=lambda one: one.evidence, default=None)
-    bursts = max(free, key=lambda one: one.bursts, default=None)
-    if smooth is not None and (bursts is None or smooth.evidence >= bursts.bursts):
-        balance, largest, most = smooth.balance, smooth.largest, smooth.evidence
-        regime = smooth.argument.replace('_', ' ')
-        how = (f' that follows {PAST[smooth.argument][2]}' if smooth.argument in PAST else
-               f', a smooth function of {regime}')
-    else:
-        assert bursts is not None  # else nothing is left, and the verdict another one
-        balance, most, regime = bursts.balance, bursts.bursts, 'scattered times'
-        largest = max(float(np.max(np.abs(m.values))) for m in free if m.balance == balance)
-        how = f' at {regime}'
-    where = {'force': 'a force on the chassis', 'moment': 'a yaw moment on the chassis',
-             'torque_left': 'a torque on the left wheels',
-             'torque_right': 'a torque on the right wheels'}[balance]
-    _, _, side, subsystem, unit = BALANCES[balance]
-    text = (f'No effect of the catalogue explains it; it is best described as {where}{how}, '
-            f'up to {largest:.3g} {unit}.')
-    elements = {'force': ('M_H',), 'moment': ('J_H',), 'torque_left': ('J_LW',),
-                'torque_right': ('J_RW',)}[balance]
-    rivals = rivals_of(replace(search.rounds[0], adopted=False))
-    return Finding('unknown', side, subsystem, elements, regime, None, (),
-                   most, float('nan'), 1.0, rivals, text)

@@ -12,9 +12,7 @@ from lg_husky_sim.diagnosis.conclusion import (
     estimates,
     findings,
     indistinguishable,
-    remaining,
     undetermined,
-    unknown_finding,
     without_undetermined,
 )
 from lg_husky_sim.diagnosis.decision.confidence import Features
@@ -25,11 +23,11 @@ from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors
-from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort
 from lg_husky_sim.diagnosis.localisation import mismatches, Missing, missing_efforts
 from lg_husky_sim.diagnosis.log_notes import log_notes, reading_notes
 from lg_husky_sim.diagnosis.model_mismatch import model_mismatch, ModelMismatch, unsearched
+from lg_husky_sim.diagnosis.nameless import described, left_over, remaining, unknown_finding
 from lg_husky_sim.diagnosis.result import Diagnosis, Rivalry, Verdict
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
@@ -122,7 +120,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         different = different or impossible(found.final, nominal.parameters)
         progress('smooth efforts', 0.85)
         left = remaining(found)
-        rest = efforts(left.evidence, left.final)
+        rest = left_over(left.evidence, left.final)
         free = missing_efforts(left.evidence, left.final)
         progress('intervals', 0.9)
         said, features = _diagnosis(found, left, rest, free, parts, nominal, there)
@@ -204,13 +202,8 @@ def _remaining(found: Search, rest: Sequence[Effort]) -> str:
     text = []
     if rest and rest[0].evidence > 0.0:
         first = rest[0]
-        of = PAST[first.argument][2] if first.argument in PAST else (
-            first.argument.replace('_', ' '))
-        what = {'torque_left': 'torque on the left wheels',
-                'torque_right': 'torque on the right wheels',
-                'moment': 'yaw moment'}.get(first.balance, first.balance)
-        text.append(f'the best smooth description of the remaining residual is a {what} as a '
-                    f'function of {of}, with a log evidence of {first.evidence:.1f} nats')
+        text.append(f'the best description of the remaining residual is {described(first)}, with '
+                    f'a log evidence of {first.evidence:.1f} nats')
     last = found.rounds[-1]
     if last.tried and not (found.found and last is found.rounds[len(found.found) - 1]):
         best = last.tried[0]

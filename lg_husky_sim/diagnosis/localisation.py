@@ -19,6 +19,7 @@ from lg_husky_sim.diagnosis.evidence.whitener import respond
 from lg_husky_sim.diagnosis.hypotheses.bursts import burst_evidence, levelled
 from lg_husky_sim.diagnosis.hypotheses.hat_functions import hats
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, beyond_chance
+from lg_husky_sim.diagnosis.hypotheses.wheel_bursts import wheel_bursts
 from lg_husky_sim.diagnosis.result import Mismatch
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.settings import setting
@@ -55,7 +56,8 @@ class Missing:
         are not quite white [nats]. It says where a model is off, and not that anything is
         missing: noise whose spectrum is not that of the model of it has some as well.
     bursts : float
-        Log evidence of an effort that bursts, over all drives [nats].
+        Log evidence of an effort that bursts, over all drives [nats]; at the wheels, of rates that
+        no command explains.
     """
 
     balance: str
@@ -140,10 +142,12 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
         gain, _, values, deviations = beyond_chance(evidence, fit, projection, columns)
         bursts = 0.0
         if BALANCES[balance][2] == 'none':
-            # Those of the wheels burst with every command that comes a little late.
             normal, slope = projection.problem(columns[:, steady])
             bursts = burst_evidence(levelled(
                 slope / np.sqrt(np.maximum(np.diag(normal), 1e-12)), speeds))
+        else:
+            # Their efforts burst with every command that comes a little late.
+            bursts = wheel_bursts(evidence, fit, BALANCES[balance][2])
         first = 0
         for size, drive in zip(counts, evidence.drives, strict=True):
             part = slice(first, first + size)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
-from lg_husky_sim.diagnosis.conclusion import needed_evidence
 from lg_husky_sim.diagnosis.diagnose import Case
 from lg_husky_sim.diagnosis.held_out import errors, split, stretches_of
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES
 from lg_husky_sim.diagnosis.localisation import Missing, missing_efforts, strengths
+from lg_husky_sim.diagnosis.nameless import needed_evidence
 from lg_husky_sim.diagnosis.planning import named_drive
 from lg_husky_sim.diagnosis.report import report_data
 from lg_husky_sim.diagnosis.settings import setting

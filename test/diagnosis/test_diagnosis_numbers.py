@@ -24,7 +24,7 @@ SETTINGS: dict[str, Any] = yaml.safe_load((ROOT / 'config' / 'diagnosis.yaml').r
 ENTRIES = {name: entry for section, entries in SETTINGS.items() if section != 'schema'
            for name, entry in entries.items()}
 #: Sizes of arrays, layouts and identities: no physics and no statistics.
-LAYOUT = {'STATES', 'BALANCES', 'NEUTRAL', 'LEAST_CHANCE', 'TOGETHER', 'ROWS'}
+LAYOUT = {'STATES', 'BALANCES', 'NEUTRAL', 'LEAST_CHANCE', 'TOGETHER', 'ROWS', 'DENSITY'}
 #: Who may name an effect, and which: a wording; the base robot, whose parameters have such names;
 #: and that base as a model of the library, which is made of effects.
 NAMED = {

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from lg_husky_sim.diagnosis.conclusion import answer, needed_evidence, unknown_finding
+from lg_husky_sim.diagnosis.conclusion import answer
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -19,6 +19,7 @@ from lg_husky_sim.diagnosis.evidence.whitener import respond
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST, responses
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import efforts
 from lg_husky_sim.diagnosis.localisation import missing_efforts
+from lg_husky_sim.diagnosis.nameless import needed_evidence, unknown_finding
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.screening import Projection

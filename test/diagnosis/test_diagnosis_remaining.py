@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 import math
 
-from lg_husky_sim.diagnosis.conclusion import answer, remaining
+from lg_husky_sim.diagnosis.conclusion import answer
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -17,6 +17,7 @@ from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import efforts
 from lg_husky_sim.diagnosis.localisation import missing_efforts
+from lg_husky_sim.diagnosis.nameless import remaining
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, Round
 from lg_husky_sim.diagnosis.selection.search import Search

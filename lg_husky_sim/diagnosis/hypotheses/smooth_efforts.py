@@ -11,7 +11,8 @@ effort, at the likeliest size s, is::
 
     max over s of  b' (G + I/s^2)^-1 b / 2 - ln det(I + s^2 G) / 2,   G = C'C,  b = C'e
 
-with the variance of the innovations along C as the effort leaves them, not that of white ones.
+with the variance of the innovations along C as the effort leaves them, not that of white ones. The
+errors of a gyro or an encoder as a function of what it reads are looked for in the same way.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from dataclasses import dataclass
 from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
 from lg_husky_sim.diagnosis.evidence.drives import Channel
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.noise import Whitener
 from lg_husky_sim.diagnosis.evidence.observation import Motion, probe_times
 from lg_husky_sim.diagnosis.evidence.whitener import respond
 from lg_husky_sim.diagnosis.hypotheses.hat_functions import hats
@@ -45,19 +47,24 @@ ARGUMENTS = {'force': (*CHASSIS, 'past_forward', 'past_direction'),
              'moment': (*CHASSIS, 'past_yaw', 'past_turn'),
              **dict.fromkeys(('torque_left', 'torque_right'), (
                  'wheel_rate', 'angle', 'wheel_acceleration', 'time', 'past_wheel_rate'))}
-#: Those that a description of the catalogue knows, so that a model can hold them.
-WRITABLE = ('forward', 'yaw', 'heading', 'x', 'y', 'time', 'wheel_rate', 'angle')
+#: The same of readings, whose errors may follow what they are readings of: channels, side, and the
+#: quantity of each.
+READINGS = {
+    'gyro': ((Channel.YAW_RATE,), 'none', 'yaw'),
+    'encoder_left': ((Channel.WHEEL_LEFT, Channel.ANGLE_LEFT), 'left', 'wheel_rate'),
+    'encoder_right': ((Channel.WHEEL_RIGHT, Channel.ANGLE_RIGHT), 'right', 'wheel_rate'),
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Effort:
     """
-    A smooth effort as the data have it.
+    A smooth effort, or error of a sensor, as the data have it.
 
     Parameters
     ----------
     balance : str
-        Key of :data:`BALANCES`.
+        Key of :data:`BALANCES` or :data:`READINGS`.
     argument : str
         Quantity that it is a function of.
     evidence : float
@@ -86,7 +93,7 @@ class Effort:
     @property
     def subsystem(self) -> str:
         """Part of the robot that the balance belongs to."""
-        return BALANCES[self.balance][3]
+        return 'sensor' if self.balance in READINGS else BALANCES[self.balance][3]
 
 
 def quantities(evidence: Evidence, motions: Sequence[Motion]) -> list[dict[str, FloatArray]]:
@@ -209,30 +216,54 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     projection = Projection(fit)
     count = int(setting('smooth_knots'))
 
-    def one_of(task: tuple[str, str]) -> Effort:
+    def one_of(task: tuple[str, str]) -> Effort | None:
         balance, argument = task
-        row = BALANCES[balance][0]
-        side = BALANCES[balance][2]
+        side = READINGS[balance][1] if balance in READINGS else BALANCES[balance][2]
         quantity = PAST[argument][0] if argument in PAST else argument
         name = quantity if side == 'none' or quantity == 'time' else f'{quantity}_{side}'
         pooled = np.concatenate([one[name] for one in known])
         low, high = (0.0, 2.0 * np.pi) if argument in ('heading', 'angle') else (
             float(np.min(pooled)), float(np.max(pooled)))
         parts, shapes = [], []
-        for drive, one, whitener in zip(evidence.drives, known, evidence.whiteners, strict=True):
+        for one, whitener in zip(known, evidence.whiteners, strict=True):
             shape = hats(one[name], low, high, count) if quantity == argument else responses(
-                one[name], probe_times(drive), argument, count)
+                one[name], probe_times(whitener.frame.drive), argument, count)
             shapes.append(shape)
-            pushed = np.zeros((shape.shape[0], 4, count))
-            pushed[:, row] = shape
-            frame = whitener.frame
-            out = np.empty((frame.times.size, count))
-            respond(pushed, probe_times(drive), frame.times, drive.channels, frame.order,
-                    frame.cosine, frame.sine, whitener.model, setting('longest_step'), out)
-            parts.append(whitener.apply(out))
-        gain, explained, values, deviations = beyond_chance(
-            evidence, fit, projection, np.concatenate(parts))
+            parts.append(whitener.apply(
+                _misread(whitener, balance, shape) if balance in READINGS else
+                _moved(whitener, BALANCES[balance][0], shape)))
+        columns = np.concatenate(parts)
+        if not np.any(columns):
+            return None
+        gain, explained, values, deviations = beyond_chance(evidence, fit, projection, columns)
         largest = max(float(np.max(np.abs(shape @ values))) for shape in shapes)
         return Effort(balance, argument, gain, explained, low, high, values, deviations, largest)
-    tasks = [(b, a) for b in BALANCES for a in ARGUMENTS[b]]
-    return tuple(sorted(evidence.pool.map(one_of, tasks), key=lambda e: -e.evidence))
+    tasks = [*((b, a) for b in BALANCES for a in ARGUMENTS[b]),
+             *((b, argument) for b, (*_, argument) in READINGS.items())]
+    found = [one for one in evidence.pool.map(one_of, tasks) if one is not None]
+    return tuple(sorted(found, key=lambda e: -e.evidence))
+
+
+def _moved(whitener: Whitener, row: int, shape: FloatArray) -> FloatArray:
+    # Readings that efforts of such shapes over time move, shape (n, k).
+    frame, drive = whitener.frame, whitener.frame.drive
+    pushed = np.zeros((shape.shape[0], 4, shape.shape[1]))
+    pushed[:, row] = shape
+    out = np.empty((frame.times.size, shape.shape[1]))
+    respond(pushed, probe_times(drive), frame.times, drive.channels, frame.order, frame.cosine,
+            frame.sine, whitener.model, setting('longest_step'), out)
+    return out
+
+
+def _misread(whitener: Whitener, reading: str, shape: FloatArray) -> FloatArray:
+    # Readings of a sensor whose rate is wrong by such shapes over time, shape (n, k).
+    drive, times = whitener.frame.drive, probe_times(whitener.frame.drive)
+    out = np.zeros((drive.measured.size, shape.shape[1]))
+    for channel in READINGS[reading][0]:
+        part = drive.slice_of(channel)
+        if part.stop > part.start:
+            rates = shape if channel not in (Channel.ANGLE_LEFT, Channel.ANGLE_RIGHT) else (
+                np.cumsum(shape, axis=0) * (times[1] - times[0]))
+            out[part] = np.column_stack([np.interp(
+                whitener.frame.times[part], times, rate) for rate in rates.T])
+    return out

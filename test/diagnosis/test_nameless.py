@@ -1,0 +1,208 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What repeats, a sensor that errs, a motor that drops out: found, described, and not in noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.conclusion import answer
+from lg_husky_sim.diagnosis.evidence.adjoint import scores
+from lg_husky_sim.diagnosis.evidence.drives import Channel, drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.noise import first_guess, Whitener
+from lg_husky_sim.diagnosis.evidence.observation import probe_times
+from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.evidence.whitener import respond
+from lg_husky_sim.diagnosis.hypotheses.lines import chance_of_lines, DENSITY, lines, periodogram
+from lg_husky_sim.diagnosis.hypotheses.wheel_bursts import wheel_bursts
+from lg_husky_sim.diagnosis.localisation import missing_efforts
+from lg_husky_sim.diagnosis.nameless import left_over, needed_evidence, unknown_finding
+from lg_husky_sim.diagnosis.result import Finding, Verdict
+from lg_husky_sim.diagnosis.selection.rounds import Round
+from lg_husky_sim.diagnosis.selection.screening import Projection
+from lg_husky_sim.diagnosis.selection.search import Search
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import Recording
+from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.threads import Threads
+import numpy as np
+import pytest
+
+LEFT = 2
+#: Length of a step of the commands [s]; the last part of each sees no change.
+STEP = 1.2
+STEPS = [(STEP, 0.2 + 0.7 * float(np.sin(1.7 * k)), 0.6 * float(np.sin(2.9 * k)))
+         for k in range(24)]
+
+
+@pytest.fixture(scope='module')
+def fitted(record: Callable[..., Recording]) -> Iterator[tuple[Evidence, Fit]]:
+    """Return the evidence of two drives of a robot that lacks nothing, and their fit."""
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    backwards = [(duration, -forward, -yaw) for duration, forward, yaw in STEPS[::-1]]
+    drives = drives_of([record('ahead', plant, STEPS, 4), record('back', plant, backwards, 5)])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['ahead', 'back'], start, first_guess(drives), pool)
+        yield evidence, evidence.fit(start)
+
+
+def _moved(whitener: Whitener, efforts: FloatArray) -> FloatArray:
+    # Innovations of efforts at the probe times, shape (n_probe, 4).
+    frame, drive = whitener.frame, whitener.frame.drive
+    out = np.empty((frame.times.size, 1))
+    respond(np.ascontiguousarray(efforts[:, :, None]), probe_times(drive), frame.times,
+            drive.channels, frame.order, frame.cosine, frame.sine, whitener.model,
+            setting('longest_step'), out)
+    return whitener.apply(out)[:, 0]
+
+
+def _noisy(evidence: Evidence, fit: Fit, innovations: FloatArray) -> Search:
+    # A search that found nothing, where innovations are left beside white noise.
+    noise = np.random.default_rng(5).standard_normal(evidence.count)
+    apart = Projection(fit).apart(innovations[:, None])[:, 0]
+    left = replace(fit, whitened=noise + apart)
+    return Search(left, left, evidence, (Round(evidence, left, (), False, 1.0),), ())
+
+
+def _said(search: Search) -> tuple[Verdict, Finding | None]:
+    rest = left_over(search.evidence, search.final)
+    free = missing_efforts(search.evidence, search.final)
+    verdict = answer(search, rest, free).verdict
+    return verdict, unknown_finding(search, rest, free) if verdict is Verdict.UNKNOWN else None
+
+
+def test_scores_of_efforts_are_products_with_their_innovations(
+        fitted: tuple[Evidence, Fit]) -> None:
+    evidence, _ = fitted
+    rng = np.random.default_rng(3)
+    for whitener in evidence.whiteners:
+        efforts = rng.standard_normal((probe_times(whitener.frame.drive).size, 4))
+        weights = rng.standard_normal(whitener.frame.times.size)
+        expected = float(weights @ _moved(whitener, efforts))
+        assert float(np.sum(scores(whitener, weights) * efforts)) == pytest.approx(
+            expected, rel=1e-9)
+
+
+def test_noise_of_any_spectrum_has_lines_no_more_often_than_stated() -> None:
+    # Of first-order noise over an uneven quantity, a hundred pairs of drives: with a rate of
+    # 5 %, more than twelve would have a chance of 1 in 500.
+    rng = np.random.default_rng(11)
+    seen = []
+    for _ in range(100):
+        spectra = []
+        for _ in range(2):
+            noise = np.zeros(1500)
+            for k in range(1, noise.size):
+                noise[k] = 0.9 * noise[k - 1] + rng.standard_normal()
+            quantity = np.cumsum(0.5 + 0.4 * np.sin(np.arange(1500) / 90.0)) / 20.0
+            spectra.append(periodogram(noise, quantity, 1.0 / (DENSITY * np.ptp(quantity)), 500))
+        logs = chance_of_lines(spectra)
+        edge = DENSITY * int(setting('line_least'))
+        inside = logs[edge:-edge]
+        seen.append(float(np.min(inside)) + np.log(inside.size / DENSITY))
+    assert np.count_nonzero(np.array(seen) < np.log(0.05)) <= 12
+    assert np.min(seen) > np.log(1e-5)
+
+
+@pytest.mark.parametrize(('quantity', 'period', 'words'), [
+    ('angle_left', 0.6, 'rad of the angle of these wheels'),
+    ('voltage_left', 1.3, 'V of the voltage of this motor')])
+def test_what_repeats_is_unknown_and_says_over_what(
+        fitted: tuple[Evidence, Fit], quantity: str, period: float, words: str) -> None:
+    evidence, fit = fitted
+    parts = []
+    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
+                                strict=True):
+        efforts = np.zeros((probe_times(whitener.frame.drive).size, 4))
+        efforts[:, LEFT] = 2.0 * np.cos(2.0 * np.pi / period * motion.column(quantity, 'probe'))
+        parts.append(_moved(whitener, efforts))
+    search = _noisy(evidence, fit, np.concatenate(parts))
+    found = lines(evidence, search.final)
+    assert (found[0].balance, found[0].argument) == ('torque_left', quantity.split('_')[0])
+    assert found[0].period == pytest.approx(period, rel=0.03)
+    # A period that is a little off goes out of phase.
+    assert 1.0 < found[0].largest < 2.5
+    verdict, said = _said(search)
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert (said.subsystem, said.side) == ('drivetrain', 'left')
+    assert words in said.statement
+
+
+def test_a_gyro_that_ends_at_some_rate_errs_and_no_effort_is_blamed(
+        fitted: tuple[Evidence, Fit]) -> None:
+    evidence, fit = fitted
+    parts = []
+    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
+                                strict=True):
+        drive = whitener.frame.drive
+        yaw = np.interp(whitener.frame.times, probe_times(drive),
+                        motion.column('yaw_rate', 'probe'))
+        error = np.zeros((drive.measured.size, 1))
+        part = drive.slice_of(Channel.YAW_RATE)
+        error[part, 0] = (np.clip(yaw, -0.3, 0.3) - yaw)[part]
+        parts.append(whitener.apply(error)[:, 0])
+    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert said.subsystem == 'sensor'
+    assert 'error of the gyro, a smooth function of yaw' in said.statement
+
+
+def _with_pulses(evidence: Evidence, fit: Fit, moments: tuple[float, ...], length: float
+                 ) -> Search:
+    parts = []
+    for whitener in evidence.whiteners:
+        times = probe_times(whitener.frame.drive)
+        efforts = np.zeros((times.size, 4))
+        for moment in moments:
+            since = times - whitener.frame.drive.start - moment
+            efforts[:, LEFT] -= np.where((since >= 0.0) & (since < length), 30.0, 0.0)
+        parts.append(_moved(whitener, efforts))
+    return _noisy(evidence, fit, np.concatenate(parts))
+
+
+def test_a_motor_that_drops_out_while_no_command_changes_is_unknown(
+        fitted: tuple[Evidence, Fit]) -> None:
+    evidence, fit = fitted
+    search = _with_pulses(evidence, fit, tuple(k * STEP + 0.85 for k in (3, 8, 14, 20)), 0.15)
+    assert wheel_bursts(evidence, search.final, 'right') == 0.0
+    verdict, said = _said(search)
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert (said.subsystem, said.side) == ('drivetrain', 'left')
+    assert 'a torque on the left wheels at scattered times' in said.statement
+
+
+def test_what_a_late_command_can_do_and_what_happens_once_is_no_burst(
+        fitted: tuple[Evidence, Fit]) -> None:
+    evidence, fit = fitted
+    after_steps = _with_pulses(evidence, fit, tuple(k * STEP + 0.1 for k in (4, 9, 15)), 0.06)
+    e = after_steps.final.whitened
+    assert np.count_nonzero(np.abs(e) > setting('far')) > 10
+    assert wheel_bursts(evidence, after_steps.final, 'left') == 0.0
+    one = evidence.whiteners[0]
+    efforts = np.zeros((probe_times(one.frame.drive).size, 4))
+    efforts[int((10.0 * STEP + 0.85) / setting('probe_spacing')):, LEFT] = 30.0
+    efforts[int((10.0 * STEP + 1.0) / setting('probe_spacing')):, LEFT] = 0.0
+    rest = np.zeros(evidence.count - one.frame.times.size)
+    once = _noisy(evidence, fit, np.concatenate([_moved(one, efforts), rest]))
+    assert wheel_bursts(evidence, once.final, 'left') == 0.0
+
+
+def test_white_noise_has_nothing_without_a_name(fitted: tuple[Evidence, Fit]) -> None:
+    evidence, fit = fitted
+    search = _noisy(evidence, fit, np.zeros(evidence.count))
+    rest = left_over(evidence, search.final)
+    free = missing_efforts(evidence, search.final)
+    assert max(one.evidence for one in rest) < needed_evidence(rest, free)
+    assert _said(search)[0] is Verdict.NOTHING_MISSING
