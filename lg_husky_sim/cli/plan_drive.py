@@ -14,11 +14,7 @@ from lg_husky_sim.cli.common import Output, spoken
 
 if TYPE_CHECKING:
     from lg_husky_sim.diagnosis.planning import Rival
-    from lg_husky_sim.husky.parameters import Parameters
     from lg_husky_sim.manoeuvres import Manoeuvre
-
-SPEED, YAW = 0.8, 0.8
-"""Highest speed [m/s] and yaw rate [rad/s] of a Husky's drives, unless told otherwise."""
 
 
 @click.command(short_help='Find the drive that best distinguishes two explanations.')
@@ -47,7 +43,7 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     the other one is refitted to it; the best drive is that on which neither can imitate the other.
     """
     from lg_husky_sim.api.tables import Table
-    from lg_husky_sim.diagnosis.planning import drives, plan
+    from lg_husky_sim.diagnosis.planning import drives, plan, usual_speeds
     from lg_husky_sim.diagnosis.settings import setting
     from lg_husky_sim.errors import SettingsError
 
@@ -56,7 +52,7 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     if out.is_dir() or not out.resolve().parent.is_dir():
         raise SettingsError(f'cannot write {out}: it must be a file in an existing folder')
     one, two = _from_folder(folder) if folder is not None else _from_ids(effects or '', robot)
-    speed, rate = _usual(one.parameters)
+    speed, rate = usual_speeds(one.parameters)
     candidates = drives(max_speed or speed, max_yaw or rate)
     with say.stages() as report:
         done = itertools.count(1)
@@ -74,17 +70,6 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     say.written(out, f': {best.manoeuvre.name}, {best.manoeuvre.about}')
     if best.nats < setting('decisive'):
         say.remark('None of these drives is decisive: another sensor or a higher speed is needed.')
-
-
-def _usual(parameters: Parameters) -> tuple[float, float]:
-    # Highest speed and yaw rate of a drive, of which no robot is asked more than of a Husky.
-    from lg_husky_sim.husky.by_hand import other_robot
-    from lg_husky_sim.husky.model_file import packaged
-    from lg_husky_sim.husky.robot_size import speeds_of
-    husky = packaged().parameters
-    forward, yaw, _ = speeds_of(parameters, husky) if other_robot(husky, parameters) else (
-        1.0, 1.0, 1.0)
-    return SPEED * min(1.0, forward), YAW * min(1.0, yaw)
 
 
 def _from_ids(text: str, robot: Path | None) -> tuple[Rival, Rival]:

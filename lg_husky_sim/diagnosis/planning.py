@@ -26,9 +26,12 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.diagnosis.localisation import NAMES
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import DiagnosisError, LgHuskyError
+from lg_husky_sim.husky.by_hand import other_robot
 from lg_husky_sim.husky.effects import check_distinct, Effect
 from lg_husky_sim.husky.model import compile_model, Structure
+from lg_husky_sim.husky.model_file import packaged
 from lg_husky_sim.husky.parameters import Parameters
+from lg_husky_sim.husky.robot_size import speeds_of
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.threads import Threads
@@ -304,8 +307,30 @@ def plan(one: Rival, two: Rival, manoeuvres: Sequence[Manoeuvre],
     return tuple(sorted(found, key=lambda s: -s.nats))
 
 
-def named_drive(effects: Sequence[str], structure: Structure, parameters: Parameters,
-                speed: float = 0.8, rate: float = 0.8) -> str:
+def usual_speeds(parameters: Parameters) -> tuple[float, float]:
+    """
+    Return how fast planned drives are.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the robot's model.
+
+    Returns
+    -------
+    float
+        Highest speed [m/s], which asks no more of a slower robot than of a Husky.
+    float
+        Highest yaw rate [rad/s], likewise.
+    """
+    husky = packaged().parameters
+    forward, yaw, _ = speeds_of(parameters, husky) if other_robot(husky, parameters) else (
+        1.0, 1.0, 1.0)
+    return (setting('planned_speed') * min(1.0, forward),
+            setting('planned_rate') * min(1.0, yaw))
+
+
+def named_drive(effects: Sequence[str], structure: Structure, parameters: Parameters) -> str:
     """
     Return in words the drive that tells the first two of several effects apart.
 
@@ -315,8 +340,6 @@ def named_drive(effects: Sequence[str], structure: Structure, parameters: Parame
         At least two ids of the catalogue.
     structure, parameters
         The model that they are added to, at typical sizes.
-    speed, rate : float
-        Highest speed [m/s] and yaw rate [rad/s].
 
     Returns
     -------
@@ -325,7 +348,7 @@ def named_drive(effects: Sequence[str], structure: Structure, parameters: Parame
     """
     try:
         one, two = (typical(name, structure, parameters) for name in effects[:2])
-        best = plan(one, two, drives(speed, rate))[0]
+        best = plan(one, two, drives(*usual_speeds(parameters)))[0]
     except LgHuskyError:
         return ''
     return best.manoeuvre.about if best.nats > setting('decisive') else ''

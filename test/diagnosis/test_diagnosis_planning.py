@@ -10,7 +10,15 @@ from typing import Any
 
 from lg_husky_sim.api.robots import Husky
 from lg_husky_sim.cli.main import run
-from lg_husky_sim.diagnosis.planning import drives, imitated, named_drive, plan, typical
+from lg_husky_sim.diagnosis.planning import (
+    drives,
+    imitated,
+    named_drive,
+    plan,
+    typical,
+    usual_speeds,
+)
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
@@ -53,6 +61,14 @@ def test_drive_is_named_in_words_where_one_decides() -> None:
     assert named_drive(pair, model.structure, model.parameters) == (
         'a long straight run, both ways')
     assert named_drive(('slope', 'slope'), model.structure, model.parameters) == ''
+
+
+def test_a_slower_robot_is_asked_no_more_than_a_husky() -> None:
+    husky = load_model().parameters
+    assert usual_speeds(husky) == (setting('planned_speed'), setting('planned_rate'))
+    slow = husky.replacing({'command_gain': 4.0 * husky['command_gain'], 'wheel_radius': 0.05,
+                            'track': 0.2})
+    assert usual_speeds(slow)[0] == pytest.approx(setting('planned_speed') / 4.0)
 
 
 def test_command_writes_a_script_that_can_be_driven(tmp_path: Path, capsys: Any) -> None:
