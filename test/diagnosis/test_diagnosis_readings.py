@@ -15,11 +15,13 @@ from lg_husky_sim.diagnosis.evidence.observation import observe, simulate
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, loosened, Unknown
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
 from lg_husky_sim.diagnosis.log_notes import reading_notes
 from lg_husky_sim.diagnosis.selection import conventions
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
-from lg_husky_sim.diagnosis.selection.nominal import is_distorted
+from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -264,3 +266,22 @@ def test_positions_alone_are_predicted_as_counts(
     for channel in (Channel.ANGLE_LEFT, Channel.ANGLE_RIGHT):
         assert np.ptp(own.measured[own.slice_of(channel)]) > 5.0
         assert np.max(np.abs(error[own.slice_of(channel)])) < 0.006 * fastest
+
+
+def test_a_reading_is_chosen_though_the_model_would_run_away_at_nominal_numbers(
+        driven: Drive) -> None:
+    model = load_model()
+    hypothesis = next(h for h in hypotheses(model.structure) if h.effect.id == 'yaw_scrub_speed')
+    start = beginning(model.structure, base_unknowns(model.parameters, [driven]),
+                      model.parameters, Reading())
+    places = np.array(start.places)
+    place = [u.name for u in start.unknowns].index('yaw_damping')
+    places[place] = start.unknowns[place].place(200.0)
+    point = hypothesis.point(start.at(places), {'scrub_slope': -59.0})
+    with Threads(1) as pool:
+        evidence = evidence_of([driven], ['one'], start, first_guess([driven]), pool)
+        fit = replace(evidence.fit(point, rounds=1), point=point)
+        with pytest.raises(ParameterError, match='unstable'):
+            evidence.predict(nominal_of(fit.point))
+        chosen = best_reading(evidence, fit, afresh=True)
+    assert chosen.cost <= fit.cost

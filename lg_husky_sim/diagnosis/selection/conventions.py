@@ -11,6 +11,7 @@ window is a convention, one without is late.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 import math
 
@@ -21,6 +22,7 @@ from lg_husky_sim.diagnosis.evidence.reading import imu_lag, Reading, wheel_lag,
 from lg_husky_sim.diagnosis.evidence.unknowns import window_unknown
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -59,9 +61,11 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     rounds = int(setting('reading_rounds'))
     begins = [fit]
     if afresh or is_distorted(fit):
-        # One step takes the derivatives there.
+        # One step takes the derivatives there; a model with an effect that only other numbers can
+        # bear runs away there, and does not begin there.
         start = nominal_of(fit.point)
-        begins.append(replace(evidence.fit(start, rounds=1), point=start))
+        with suppress(ParameterError):
+            begins.append(replace(evidence.fit(start, rounds=1), point=start))
     chosen: list[tuple[Point, Fit]] = []
     for begin in begins:
         points = [_read_so(evidence, begin.point, one) for one in options]
