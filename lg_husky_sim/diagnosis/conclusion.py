@@ -216,11 +216,11 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     features = Features(best.gain, 1.0 - max(second, 0.0) / max(best.score, 1e-9),
                         explained / told, first.chance)
     is_unknown = is_left and features.share > setting('unknown_share') and not (
-        _is_its_form(search, rest, told))
+        _is_its_form(search, rest))
     return _sure(Verdict.UNKNOWN if is_unknown else Verdict.KNOWN, features)
 
 
-def _is_its_form(search: Search, rest: Sequence[Effort], told: float) -> bool:
+def _is_its_form(search: Search, rest: Sequence[Effort]) -> bool:
     # Whether what is left is a law of another form: at the balance, and over the quantity, where
     # the effects explain most, and most of what there is. One that remembers or repeats is none,
     # and the factor and the offset of a sensor have only one.
@@ -233,7 +233,7 @@ def _is_its_form(search: Search, rest: Sequence[Effort], told: float) -> bool:
         search.evidence, search.evidence.fit(search.plain.point))}
     best = max(whole, key=lambda place: whole[place] - left.get(place, 0.0))
     return best == (most.balance, most.argument) and (
-        told > setting('form_share') * whole[best])
+        whole[best] - most.explained > setting('form_share') * whole[best])
 
 
 def _sure(verdict: Verdict, features: Features) -> Answer:

@@ -158,6 +158,23 @@ def test_a_gyro_that_ends_at_some_rate_errs_and_no_effort_is_blamed(
     assert 'error of the gyro, a smooth function of yaw' in said.statement
 
 
+def test_a_motor_that_brakes_less_than_it_drives_is_unknown_and_says_so(
+        fitted: tuple[Evidence, Fit]) -> None:
+    evidence, fit = fitted
+    parts = []
+    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
+                                strict=True):
+        rate, current = (motion.column(f'{name}_left', 'probe') for name in ('wheel', 'current'))
+        efforts = np.zeros((probe_times(whitener.frame.drive).size, 4))
+        efforts[:, LEFT] = np.where(rate * current < 0.0, -1.0 * current, 0.0)
+        parts.append(_moved(whitener, efforts))
+    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert said.regime == 'driving current'
+    assert (said.subsystem, said.side) == ('drivetrain', 'left')
+
+
 def _with_pulses(evidence: Evidence, fit: Fit, moments: tuple[float, ...], length: float
                  ) -> Search:
     parts = []

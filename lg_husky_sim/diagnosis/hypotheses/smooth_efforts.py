@@ -46,7 +46,8 @@ CHASSIS = ('forward', 'yaw', 'acceleration', 'heading', 'x', 'y', 'time')
 ARGUMENTS = {'force': (*CHASSIS, 'past_forward', 'past_direction'),
              'moment': (*CHASSIS, 'past_yaw', 'past_turn'),
              **dict.fromkeys(('torque_left', 'torque_right'), (
-                 'wheel_rate', 'angle', 'wheel_acceleration', 'time', 'past_wheel_rate'))}
+                 'wheel_rate', 'angle', 'wheel_acceleration', 'time', 'past_wheel_rate',
+                 'driving_current'))}
 #: The same of readings, whose errors may follow what they are readings of: channels, side, and the
 #: quantity of each.
 READINGS = {
@@ -100,7 +101,8 @@ def quantities(evidence: Evidence, motions: Sequence[Motion]) -> list[dict[str, 
     """
     Return what an effort may be a function of, at the probe times of each drive.
 
-    Headings and places are the measured ones where there are any.
+    Headings and places are the measured ones where there are any. The driving current of a motor
+    is positive while it drives the wheels and negative while it brakes them.
     """
     found = []
     before = 0.0
@@ -121,6 +123,9 @@ def quantities(evidence: Evidence, motions: Sequence[Motion]) -> list[dict[str, 
         for side in ('left', 'right'):
             rate = motion.column(f'wheel_{side}', 'probe')
             one[f'wheel_rate_{side}'] = rate
+            sense = np.clip(rate / setting('turning_wheel'), -1.0, 1.0)
+            one[f'sense_{side}'] = sense
+            one[f'driving_current_{side}'] = sense * motion.column(f'current_{side}', 'probe')
             one[f'wheel_acceleration_{side}'] = np.gradient(rate, times)
             one[f'angle_{side}'] = np.mod(motion.column(f'angle_{side}', 'probe'), 2.0 * np.pi)
         found.append(one)
@@ -228,6 +233,9 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
         for one, whitener in zip(known, evidence.whiteners, strict=True):
             shape = hats(one[name], low, high, count) if quantity == argument else responses(
                 one[name], probe_times(whitener.frame.drive), argument, count)
+            if argument == 'driving_current':
+                # What helps forwards helps backwards.
+                shape *= one[f'sense_{side}'][:, None]
             shapes.append(shape)
             parts.append(whitener.apply(
                 _misread(whitener, balance, shape) if balance in READINGS else
