@@ -20,6 +20,7 @@ looked at, the largest exceeds ``n / rate`` with a probability of at most that r
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
@@ -59,6 +60,26 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
     return min(1.0, count * tail)
 
 
+def gain_of_laws(found: Sequence[Hypothesis], gains: Sequence[float]) -> float:
+    """
+    Return the gain of which further effects have to gain a part.
+
+    Parameters
+    ----------
+    found : sequence of Hypothesis
+        Adopted, in the order of adoption.
+    gains : sequence of float
+        Of each [nats].
+
+    Returns
+    -------
+    float
+        That of the first effect but for those of sensors, whose form is exact: 0 without one.
+    """
+    return next((gain for one, gain in zip(found, gains, strict=True)
+                 if one.effect.kind.subsystem is not Subsystem.SENSOR), 0.0)
+
+
 def least_beside(hypothesis: Hypothesis, first: float) -> float:
     """
     Return what an effect has to gain beside a first one.
@@ -67,7 +88,7 @@ def least_beside(hypothesis: Hypothesis, first: float) -> float:
     ----------
     hypothesis : Hypothesis
     first : float
-        Gain of the first effect [nats]; 0 where there is none.
+        Gain of the first effect [nats], see :func:`gain_of_laws`.
 
     Returns
     -------

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from lg_husky_sim.diagnosis.decision.adoption import least_beside
+from lg_husky_sim.diagnosis.decision.adoption import gain_of_laws, least_beside
 from lg_husky_sim.diagnosis.evidence.base_clock import ticking
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -372,7 +372,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             base = one.base
             break
         found.append(best.hypothesis)
-        first = rounds[0].tried[0].gain
+        first = gain_of_laws(found, [r.tried[0].gain for r in rounds])
         evidence, base = _settled(evidence, best.fit.point, known.first)
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
