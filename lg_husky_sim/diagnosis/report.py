@@ -10,7 +10,7 @@ import math
 from lg_husky_sim.diagnosis.before_after.settings import settings as before_after
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.diagnosis.wording import LATENESS, lateness_words, PHASE, sized
+from lg_husky_sim.diagnosis.wording import LATENESS, lateness_words, PHASE, sized, what_to_check
 from lg_husky_sim.husky.effects import catalogue, effect_kind, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.data import (
@@ -213,8 +213,7 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str], *,
                          'give it one of its own: `--robot FILE.yaml`.')
             continue
         if finding.effect == 'unknown':
-            robot.append('Check the part of the robot that the report names, at the times that it '
-                         'lists: no effect of the catalogue behaves like this.')
+            robot.append(what_to_check(finding))
             continue
         values: dict[str, float | str] = {one.name: one.value for one in sized(finding.parameters)}
         values |= {'side': finding.side, 'where': 'both sides', 'wheels': 'the wheels'}
@@ -254,7 +253,8 @@ def _for_a_change(finding: Finding, values: Mapping[str, float | str]) -> tuple[
 
 def _which(diagnosis: Diagnosis) -> str:
     # What model.yaml is.
-    if not diagnosis.findings or diagnosis.model == diagnosis.plain_model:
+    nameless = diagnosis.fits and all(f.effect == 'unknown' for f in diagnosis.findings)
+    if nameless or diagnosis.model == diagnosis.plain_model:
         return 'recalibrated model'
     return 'model with the finding' if diagnosis.fits else (
         'commercial base, a starting point for a model of this robot')

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-from lg_husky_sim.diagnosis.result import Estimate
-from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.diagnosis.result import Estimate, Finding
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind, Subsystem
 from lg_husky_sim.reporting.words import with_interval
 
 _STREAMS = {'wheels': 'of the wheels (joint states)', 'imu': 'of the IMU',
@@ -18,6 +18,21 @@ AMPLITUDE, PHASE = 'amplitude', 'phase'
 _HARMONICS = {'': '', '_twice': ' of the second harmonic'}
 #: The number of an effect that says how late stamps are, or how early.
 LATENESS = 'stamp_delay'
+#: What to check on a robot, by the quantity that an effort or an error follows.
+CHECKS = {
+    'angle': 'With the motors off, turn the wheels of that side by hand: feel for detents, a rub '
+             'or a tight spot that repeats as often; look at motor, gears, bearings and tyres.',
+    'distance': 'Look at the floor for joints or waves that repeat as often, and at the tyres.',
+    'voltage': 'Look at the output of the motor driver, or its duty cycle: it seems to move in '
+               'steps of this size (few levels, or a command that is rounded).',
+    'driving current': 'Let the robot coast, brake and drive at one speed, and compare: the '
+                       'driver may not brake as it drives (coast instead of brake mode, a limit '
+                       'of what it feeds back).',
+    'scattered times': 'While it drives slowly, move the connectors and cables of motor, encoder '
+                       'and battery of that side, and read the fault log of its driver.',
+    'sensor': 'Hold this sensor against another one over its whole range: it may end at some '
+              'rate, lose counts, or be filtered.',
+}
 
 
 def onset_words(onset: Onset | None) -> str:
@@ -101,3 +116,12 @@ def sentence(effect: Effect, onset: Onset | None, numbers: Sequence[Estimate], r
         names = ' and '.join(name.replace('_', ' ') for name in undetermined)
         text += f' These recordings do not determine {names}.'
     return text[0].upper() + text[1:]
+
+
+def what_to_check(finding: Finding) -> str:
+    """Return what to look at on a robot where something is missing that has no name."""
+    kind = 'sensor' if finding.subsystem == Subsystem.SENSOR.value else finding.regime
+    if kind == 'scattered times' and finding.side == 'none':
+        kind = ''
+    return CHECKS.get(kind, 'Check the part of the robot that the report names, at the times that '
+                            'it lists: no effect of the catalogue behaves like this.')

@@ -26,6 +26,7 @@ from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.diagnosis.wording import what_to_check
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -214,6 +215,18 @@ def test_what_a_late_command_can_do_and_what_happens_once_is_no_burst(
     rest = np.zeros(evidence.count - one.frame.times.size)
     once = _noisy(evidence, fit, np.concatenate([_moved(one, efforts), rest]))
     assert wheel_bursts(evidence, once.final, 'left') == 0.0
+
+
+@pytest.mark.parametrize(('subsystem', 'side', 'regime', 'words'), [
+    ('drivetrain', 'left', 'angle', 'turn the wheels of that side by hand'),
+    ('drivetrain', 'left', 'scattered times', 'connectors and cables'),
+    ('translation', 'none', 'scattered times', 'the part of the robot that the report names'),
+    ('sensor', 'none', 'yaw', 'against another one'),
+    ('rotation', 'none', 'past yaw', 'the part of the robot that the report names')])
+def test_what_to_check_depends_on_what_the_effort_follows(
+        subsystem: str, side: str, regime: str, words: str) -> None:
+    said = Finding('unknown', side, subsystem, (), regime, None, (), 9.0, 0.0, 1.0, (), '')
+    assert words in what_to_check(said)
 
 
 def test_white_noise_has_nothing_without_a_name(fitted: tuple[Evidence, Fit]) -> None:
