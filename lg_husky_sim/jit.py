@@ -146,8 +146,9 @@ class Kernel:
                     part.__dict__.update(_machine=machine, _numba_type_=machine._numba_type_)
                 made = numba.njit(cache=True, nogil=True, error_model='numpy')(self.plain)
                 if _SOURCES:
-                    forget_outdated(_index_files(made, self.plain),
-                                    max(path.stat().st_mtime for path in _SOURCES))
+                    newest = max(path.stat().st_mtime for path in
+                                 _SOURCES | {Path(numba.__file__)})
+                    forget_outdated(_index_files(made, self.plain), newest)
                 self._machine = made
         return self._machine
 
@@ -224,9 +225,10 @@ _SOURCES: set[Path] = set()
 
 
 def _index_files(made: Any, function: Callable[..., Any]) -> list[Path]:
-    # Those of numba's cache for a function.
+    # Those of numba's cache for a function; another Python over the same files has its own.
     beginning = f'{Path(function.__code__.co_filename).stem}.{function.__name__}-'
-    return list(Path(made.stats.cache_path).glob(f'{beginning}*.nbi'))
+    python = f'py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, "abiflags", "")}'
+    return list(Path(made.stats.cache_path).glob(f'{beginning}*.{python}.nbi'))
 
 
 def forget_outdated(indices: list[Path], newest: float) -> None:
