@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+import sys
 from typing import TYPE_CHECKING, TypeVar
 
 import click
@@ -108,5 +109,8 @@ def ros_tool(name: str, preset: str | None, namespace: str | None, *, wait: floa
 
 
 def say(text: str) -> None:
-    """Print a line on standard error, where it disturbs no output."""
-    click.echo(text, err=True)
+    """Print a line on standard error, where it disturbs no output; a bar there is drawn anew."""
+    from tqdm import tqdm
+
+    with tqdm.external_write_mode(file=sys.stderr):
+        click.echo(text, err=True)

@@ -34,6 +34,12 @@ def shared(settings: Settings) -> tuple[str, ...]:
     return (*(['tf'] if moving else []), *(['tf_static'] if static else []))
 
 
+def for_diagnosis(settings: Settings) -> tuple[str, ...]:
+    """Return the topics on which a node of these settings says how it keeps time."""
+    there = settings.publish_diagnostics and message_type('diagnostic_msgs/msg/DiagnosticArray')
+    return ('diagnostics',) if there else ()
+
+
 def announce(node: Node, settings: Settings) -> None:
     """Log which topics go in and out, under their full names."""
     def named(topics: tuple[str, ...]) -> str:
@@ -41,10 +47,10 @@ def announce(node: Node, settings: Settings) -> None:
 
     log = node.get_logger()
     seen = settings.scan == 'map' and not settings.map_file
-    topics = (settings.command_topic, settings.initial_pose_topic,
-              *([settings.map_topic] if seen else []))
-    log.info(f'in: {named(topics)} ({settings.command_type})')
-    log.info(f'out: {named((*topics_out(settings), *shared(settings)))}')
+    others = (settings.initial_pose_topic, *([settings.map_topic] if seen else []))
+    log.info(f'in: {named((settings.command_topic,))} ({settings.command_type}), {named(others)}')
+    log.info('out: ' + named(
+        (*topics_out(settings), *shared(settings), *for_diagnosis(settings))))
 
 
 class Neighbours:

@@ -154,12 +154,12 @@ def test_another_publisher_is_named_once(probe: Probe, made: list[SimNode]) -> N
     probe.spin(2.2)
     assert said('publishes') == ['/probe publishes /crowd/husky_velocity_controller/odom as well: '
                                  'subscribers receive both']
-    assert said('in: ') == ['in: /crowd/husky_velocity_controller/cmd_vel, /crowd/initialpose '
-                            '(Twist)']
+    assert said('in: ') == ['in: /crowd/husky_velocity_controller/cmd_vel (Twist), '
+                            '/crowd/initialpose']
     # common_interfaces has no tf2_msgs; what is not there is not announced.
     tf = ', /crowd/tf' if api.message_type('tf2_msgs/msg/TFMessage') else ''
     assert said('out: ')[0].endswith(
-        f'/crowd/joint_states, /crowd/imu_um7/data, /crowd/battery_state{tf}')
+        f'/crowd/joint_states, /crowd/imu_um7/data, /crowd/battery_state{tf}, /crowd/diagnostics')
 
 
 def test_parameters_of_others_are_left_alone(probe: Probe, made: list[SimNode]) -> None:
