@@ -76,7 +76,9 @@ class Commands:
             end.kind == self.kind for end in self.robots())
 
     def settle(self) -> None:
-        """Wait until the nodes that listen are known by name, for some seconds at most."""
+        """Wait for all the nodes that listen to be known by name, for some seconds at most."""
+        while not self._tool.orderly.acquainted:
+            self._tool.serve()
         end = time.monotonic() + NAMES
         while time.monotonic() < end and not all(one.is_named for one in self.robots()):
             self._tool.serve()

@@ -153,6 +153,12 @@ def running(counts: Mapping[str, int], seconds: float) -> str:
     return f'{seconds:7.1f} s  {sum(counts.values())} messages' + (f': {words}' if words else '')
 
 
+def _await_first(tool: Tool, recorder: Recorder) -> None:
+    # Fast DDS tells of a robot up to seconds after the recorder has joined.
+    while not any(recorder.counts.values()) and not tool.orderly.acquainted:
+        tool.serve()
+
+
 def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
            seconds: float | None = None, say: Say = print) -> dict[str, int]:
     """
@@ -168,7 +174,7 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
     storage : str
         ``mcap`` or ``sqlite3``.
     seconds : float, optional
-        How long [s].
+        How long [s], from the first message on, or from when all in the graph are known.
     say : callable
         Is told every few seconds how much has come.
 
@@ -184,10 +190,11 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
 
     """
     recorder = Recorder(tool.node, path, recorded_topics(settings), storage)
-    begun = time.monotonic()
     try:
-        due = begun + EVERY
         try:
+            _await_first(tool, recorder)
+            begun = time.monotonic()
+            due = begun + EVERY
             while seconds is None or time.monotonic() < begun + seconds:
                 tool.serve()
                 if time.monotonic() >= due:

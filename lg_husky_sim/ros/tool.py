@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+import math
 import os
 import signal
 import time
@@ -47,6 +48,7 @@ class Orderly:
         self._parent = os.getppid()
         self._asked = False
         self._last: Tool | None = None
+        self._since = math.inf
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self._asked = True
@@ -84,6 +86,15 @@ class Orderly:
         if self.over:
             raise Ended
 
+    def entered(self) -> None:
+        """Take note that the process is in the graph from now on, if it was not before."""
+        self._since = min(self._since, time.monotonic())
+
+    @property
+    def acquainted(self) -> bool:
+        """Whether the process has been in the graph for so long that it was told of all others."""
+        return time.monotonic() >= self._since + OTHERS
+
     def hand_over(self, tool: Tool | None) -> None:
         """
         Keep a tool in the graph until the next one has joined; leave with the one kept so far.
@@ -114,6 +125,7 @@ class Tool:
         """Join the graph."""
         self.orderly = orderly
         self.node = api.Node(name, namespace=namespace or '')
+        orderly.entered()
         self._executor = api.SingleThreadedExecutor()
         self._executor.add_node(self.node)
         orderly.hand_over(None)

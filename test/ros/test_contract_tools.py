@@ -93,7 +93,8 @@ def test_a_drive_that_is_ended_stops_the_robot(probe: Probe, tmp_path: Path, end
     finally:
         process.kill()
         process.wait()
-    assert f'{COMMAND} moves /probe (Twist); no limit in this preset' in said
+    # On a line of its own, not behind the bar.
+    assert f'{COMMAND} moves /probe (Twist); no limit in this preset' in said.splitlines()
     assert 'Traceback' not in said
     if end != 'parent':
         assert process.returncode == 130
@@ -172,6 +173,27 @@ def test_who_listens_is_known_by_name_before_anything_moves(
     finally:
         tool.close()
     assert not heard
+
+
+def test_a_robot_that_is_told_of_later_is_named_before_anything_moves(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fast DDS told a drive of a monitor at once and of the robot after 3 s; it moved unnamed."""
+    probe.listen('geometry_msgs/msg/Twist', '/two/cmd_vel')
+    begun = time.monotonic()
+
+    def late(node: api.Node, topic: str) -> tuple[Endpoint, ...]:
+        names = ['/monitor'] + (['/robot'] if time.monotonic() > begun + 1.5 else [])
+        return tuple(Endpoint(name, 'geometry_msgs/msg/Twist', True, False) for name in names)
+    monkeypatch.setattr(commands, 'listeners', late)
+    said: list[str] = []
+    tool = Tool('lg_husky_driver', Orderly())
+    try:
+        commands.Commands(tool, make_settings(command_topic='/two/cmd_vel')).wait(
+            0.5, said.append)
+    finally:
+        tool.close()
+    assert said == [
+        '/two/cmd_vel moves /monitor (Twist), /robot (Twist); no limit in this preset']
 
 
 def test_a_tool_that_is_asked_to_end_says_so_once_signals_are_taken(probe: Probe) -> None:
@@ -305,6 +327,28 @@ def test_best_effort_publishers_are_recorded_and_kill_9_loses_a_second_at_most(
         # rosbag2 counts its files.
         assert read.notes[0].removeprefix('bag').removeprefix('_0') == (
             '.mcap is truncated: read up to its last complete chunk')
+
+
+def test_the_time_of_a_recording_begins_with_the_first_message(
+        probe: Probe, tmp_path: Path) -> None:
+    """Fast DDS told a recorder of a running robot after 2 s: one of 2 s heard nothing."""
+    imu, message = probe.talk('sensor_msgs/msg/Imu', '/late/imu_um7/data')
+    recorder = run('record', tmp_path / 'bag', '--preset', 'paper', '--namespace', '/late',
+                   '--seconds', '0.5')
+    try:
+        assert probe.until(lambda: imu.get_subscription_count() > 0, 30.0)
+        probe.spin(1.0)
+
+        def published() -> bool:
+            imu.publish(message())
+            return recorder.poll() is not None
+        assert probe.until(published, 10.0)
+        out, said = recorder.communicate()
+    finally:
+        recorder.kill()
+        recorder.wait()
+    assert recorder.returncode == 0, said
+    assert int(out.partition('  /late/imu_um7/data')[0].rpartition('\n')[2]) > 0
 
 
 def test_a_recording_of_nothing_is_an_error(probe: Probe, tmp_path: Path) -> None:
