@@ -83,7 +83,7 @@ def _approach(now: float, wanted: float, largest: float, change: float) -> float
     return wanted
 
 
-def limited(last: BodyTwist, wanted: BodyTwist, settings: Settings) -> BodyTwist:
+def limited(last: BodyTwist, wanted: BodyTwist, settings: Settings, period: float) -> BodyTwist:
     """
     Apply the limits of speed and acceleration.
 
@@ -95,9 +95,10 @@ def limited(last: BodyTwist, wanted: BodyTwist, settings: Settings) -> BodyTwist
         What is commanded.
     settings : Settings
         Limits of zero are off.
+    period : float
+        Time since the step before [s].
 
     """
-    period = settings.period
     return BodyTwist(
         _approach(last.forward, wanted.forward, settings.max_forward,
                   settings.max_forward_acceleration * period),
@@ -190,7 +191,8 @@ class Engine:
         if self.timed_out:
             self._applied = BodyTwist()
         else:
-            self._applied = limited(self._applied, self._command, self.settings)
+            self._applied = limited(
+                self._applied, self._command, self.settings, self.settings.period)
         before: SimulatorState = self.state
         self.state = self._simulator.step(before, self._applied)
         self._held += 1

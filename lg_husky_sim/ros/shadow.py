@@ -9,7 +9,9 @@ from dataclasses import dataclass, field, replace
 import math
 
 from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.ros.engine import limited
 from lg_husky_sim.ros.sensors import sensor_model
+from lg_husky_sim.ros.settings import make_settings, Settings
 from lg_husky_sim.signals import BodyTwist, Pose, TimeSeries
 from lg_husky_sim.simulation import Simulator, SimulatorState
 from lg_husky_sim.simulation.starting import commanded_until
@@ -74,12 +76,13 @@ class Shadow:
     plant : Plant
         An effect with an onset in time is taken to have begun; one that begins at a place
         begins there.
-    timeout : float
-        Time after which a command is forgotten, as the base does [s]; 0 for never.
+    settings : Settings, optional
+        Of the robot: its limits of speed and acceleration, and the time after which it forgets
+        a command; by default those of the paper, which has none.
     """
 
     plant: Plant
-    timeout: float = 0.0
+    settings: Settings = field(default_factory=lambda: make_settings(command_timeout=0.0))
     errors: dict[str, RunningError] = field(
         default_factory=lambda: {name: RunningError() for name in QUANTITIES})
 
@@ -96,6 +99,8 @@ class Shadow:
         self._past: deque[tuple[float, tuple[float, ...]]] = deque(maxlen=round(_PAST / PERIOD))
         self._turned = (0.0, 0.0)
         self._command = BodyTwist(0.0, 0.0)
+        #: What goes to the model, behind the robot's limits.
+        self._applied = BodyTwist(0.0, 0.0)
         self._since = 0.0
         self._pose = Pose()
         #: What the model read last, to be shown beside what was measured.
@@ -117,8 +122,10 @@ class Shadow:
             self.restart()
             return None
         while state.time + PERIOD <= moment:
-            old = self.timeout > 0.0 and state.time - self._since > self.timeout
-            state = self._simulator.step(state, BodyTwist(0.0, 0.0) if old else self._command)
+            old = 0.0 < self.settings.command_timeout < state.time - self._since
+            self._applied = BodyTwist(0.0, 0.0) if old else limited(
+                self._applied, self._command, self.settings, PERIOD)
+            state = self._simulator.step(state, self._applied)
             self._remember(state)
         self._state = state
         return state
@@ -220,7 +227,8 @@ class Shadow:
             self._pose, twist, time=moment - sensors.delay_wheels, wheel_rates=rates,
             wheel_angles=(angles[0] / factors[0], angles[1] / factors[1])
             if known and angles is not None else (0.0, 0.0),
-            command=commanded_until(moment, last, twist, rates, self.timeout))
+            command=commanded_until(moment, last, twist, rates, self.settings.command_timeout))
+        self._applied = twist
         self._turned = (0.0, 0.0)
         self._remember(self._state)
 

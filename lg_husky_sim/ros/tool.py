@@ -254,11 +254,12 @@ def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wai
         seen = False
         while True:
             topics = dict(tool.node.get_topic_names_and_types())
-            robot = the_one(find_robots(topics, preset=preset, namespace=namespace))
-            if robot is not None and not seen:
+            robots = find_robots(topics, preset=preset, namespace=namespace)
+            if robots and not seen:
                 seen = True
                 end = time.monotonic() + OTHERS
             if time.monotonic() >= end:
+                robot = the_one(robots)
                 orderly.hand_over(tool)
                 return robot
             until = time.monotonic() + LOOK

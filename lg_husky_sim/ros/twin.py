@@ -65,7 +65,7 @@ class Twin:
         self._posed = False
         self._first = math.nan
         self._measured: dict[str, tuple[float, ...]] = {}
-        self.shadows = {name: Shadow(plant, settings.command_timeout)
+        self.shadows = {name: Shadow(plant, settings)
                         for name, plant in plants.items()}
         quality = api.QoSProfile(depth=100, reliability=api.ReliabilityPolicy.BEST_EFFORT)
         for kind, topic, callback in (

@@ -83,7 +83,8 @@ def test_joining_a_robot_in_motion_and_after_a_pause() -> None:
 
 def test_stale_command_is_forgotten_as_the_base_does() -> None:
     model = load_model()
-    shadow = Shadow(compile_model(model.structure).at(model.parameters), timeout=0.25)
+    shadow = Shadow(compile_model(model.structure).at(model.parameters),
+                    make_settings(command_timeout=0.25))
     shadow.wheels(0.0, 0.0, 0.0)
     shadow.command(0.0, BodyTwist(0.5, 0.0))
     shadow.gyro(0.2, 0.0)
@@ -104,7 +105,7 @@ def test_a_model_that_begins_anew_follows_what_the_base_still_does(
         timeout: float, age: float, rate: float, followed: bool) -> None:
     model = with_effects(load_model(), ['command_latency'])
     shadow = Shadow(compile_model(model.structure).at(model.parameters.replacing(
-        {'latency': 0.3})), timeout=timeout)
+        {'latency': 0.3})), settings=make_settings(command_timeout=timeout))
     shadow.command(0.0, BodyTwist(1.0, 0.0))
     shadow.wheels(age, rate, rate)
     shadow.wheels(age + 0.28, rate, rate)

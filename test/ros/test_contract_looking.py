@@ -41,12 +41,12 @@ def test_huskies_are_found_by_names_and_types_together() -> None:
 @pytest.mark.parametrize('preset', [None, 'clearpath_jazzy'])
 def test_a_second_robot_that_is_told_of_later_is_waited_for(
         probe: Probe, monkeypatch: pytest.MonkeyPatch, preset: str | None) -> None:
-    """Fast DDS told of one of three robots 2 s before the others: a tool served that one."""
-    robots = [Robot('/a200_0000', 'clearpath_jazzy', 4), Robot('/a200_0001', 'clearpath_jazzy', 4)]
+    """Fast DDS told of one of three robots 2 s before the others: a tool took or listed fewer."""
+    robots = [Robot(f'/a200_000{one}', 'clearpath_jazzy', 4) for one in range(3)]
     begun = time.monotonic()
     monkeypatch.setattr('lg_husky_sim.ros.tool.find_robots', lambda topics, **only: tuple(
-        robots[:1 if time.monotonic() < begun + 2.5 else 2]))
-    with Orderly() as orderly, pytest.raises(SettingsError, match='2 Huskies are in the graph'):
+        robots[:1 + sum(time.monotonic() > begun + later for later in (2.5, 2.8))]))
+    with Orderly() as orderly, pytest.raises(SettingsError, match='3 Huskies are in the graph'):
         choose(orderly, (), preset=preset)
 
 

@@ -55,10 +55,10 @@ def test_zero_timeout_never_times_out() -> None:
 def test_each_limit_works_alone(name: str, value: float, expected: BodyTwist) -> None:
     """T6: speed and acceleration limits are independent, and off at zero."""
     settings = make_settings({'preset': 'paper', name: value})
-    assert limited(BodyTwist(), BodyTwist(1.0, 2.0), settings) == expected
-    assert limited(BodyTwist(), BodyTwist(-1.0, -2.0), settings) == BodyTwist(
+    assert limited(BodyTwist(), BodyTwist(1.0, 2.0), settings, settings.period) == expected
+    assert limited(BodyTwist(), BodyTwist(-1.0, -2.0), settings, settings.period) == BodyTwist(
         -expected.forward, -expected.yaw)
-    assert limited(BodyTwist(), BodyTwist(1.0, 2.0), make_settings(preset='paper')) == (
+    assert limited(BodyTwist(), BodyTwist(1.0, 2.0), make_settings(preset='paper'), 0.02) == (
         BodyTwist(1.0, 2.0))
 
 

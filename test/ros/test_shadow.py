@@ -13,7 +13,11 @@ from collections.abc import Callable
 import math
 
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.ros.engine import Engine
+from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.ros.shadow import PERIOD, Shadow
 from lg_husky_sim.ros.stamp_clock import StampClock
 from lg_husky_sim.signals import BodyTwist, Pose
@@ -101,6 +105,29 @@ def test_a_late_message_is_compared_with_its_own_moment(robot: Maker) -> None:
     shadow.command(0.3, BodyTwist(0.0, 0.0))
     shadow.wheels(0.1, *state.wheel_rates)
     assert shadow.errors['wheel_rate'].overall < 1e-6
+
+
+def test_the_limits_of_the_robots_preset_act_on_the_models() -> None:
+    """A Clearpath robot accelerates by 1 m/s² at most: its very model was off by 0.4 rad/s."""
+    settings = make_settings(preset='clearpath_jazzy', rate=1.0 / PERIOD, command_timeout=0.255)
+    engine = Engine(settings)
+    shadows = {name: Shadow(Simulator(compile_model(load_model().structure).at(
+        load_model().parameters), PERIOD).plant, one) for name, one in {
+            'own': settings, 'free': make_settings(command_timeout=0.255)}.items()}
+    for shadow in shadows.values():
+        shadow.wheels(0.0, 0.0, 0.0, (0.0, 0.0))
+    # The last one is forgotten while it is being obeyed.
+    for forward, yaw, steps in ((0.5, 0.3, 100), (1.5, 0.0, 80), (-0.4, 1.5, 20), (0.3, 0.0, 80)):
+        for step in range(steps):
+            if forward > 0.3 or not step:
+                engine.command(BodyTwist(forward, yaw))
+                for shadow in shadows.values():
+                    shadow.command(engine.state.time, BodyTwist(forward, yaw))
+            engine.step()
+            for shadow in shadows.values():
+                shadow.wheels(engine.state.time + 1e-7, *engine.state.wheel_rates)
+    assert shadows['own'].errors['wheel_rate'].overall < 1e-3
+    assert shadows['free'].errors['wheel_rate'].overall > 0.1
 
 
 @pytest.mark.parametrize('pace', [0.2, 1.0, 5.0])
