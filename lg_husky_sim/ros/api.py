@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 import importlib
 from importlib.util import find_spec
 import os
+import re
 from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.errors import LgHuskyError, MissingExtraError
@@ -220,7 +221,8 @@ def leave(node: Node) -> None:
 
 def reason(error: Exception) -> str:
     """Return a user's mistake in one line, also where rclpy says only what it does not know."""
-    text = ' '.join(str(error).split())
+    # rcl adds where in its own source each function of its stack saw the mistake.
+    text = re.sub(r',? at \S+\.c:\d+', '', ' '.join(str(error).split()))
     if type(error).__name__ == 'UnknownROSArgsError':
         return f'unknown ROS argument {text.strip("[]")}'
     return text

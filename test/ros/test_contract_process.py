@@ -213,6 +213,7 @@ def test_mistakes_end_with_one_line_and_exit_code_one(probe: Probe) -> None:
         lines = [line for line in part.splitlines() if line.startswith('error: ')]
         assert len(lines) == 1
         assert text in lines[0]
+        assert '.c:' not in lines[0], 'the source of rcl is nothing to a user'
         assert 'Traceback' not in part
 
 
