@@ -76,12 +76,13 @@ def test_a_speed_loop_is_a_seed_where_the_numbers_of_the_robot_took_its_place(
 
 
 def test_smoothed_commands_are_named_and_not_a_loop_without_gains(
-        record: Recorded, steps: Steps, threads: Threads) -> None:
+        record: Recorded, steps: Steps, short: float, threads: Threads) -> None:
     """A heavy wheel follows like them: the search begins far from that."""
     model, lag = load_model(), Effect('command_slew', shape='lag')
     plant = compile_model(model.structure.with_effect(lag)).at(
         model.parameters.with_entries(*entries_of(lag, {'command_lag': 0.3})))
-    evidence, start = _begun(record('lag', plant, steps, 1), threads)
+    brief = [(short * duration, forward, yaw) for duration, forward, yaw in steps]
+    evidence, start = _begun(record('lag', plant, brief, 1), threads)
     found = search(evidence, start, lambda text, share: None)
     assert [one.effect for one in found.found] == [lag]
     assert found.final.point.values['command_lag'] == pytest.approx(0.3, rel=0.1)

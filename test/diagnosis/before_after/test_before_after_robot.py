@@ -159,7 +159,7 @@ def test_nothing_changed_between_drives_of_one_robot() -> None:
     ({'current_limit': 4.0}, 'current_limit', 'both', 'current_limit')])
 def test_a_change_is_named_with_its_number(changes: Mapping[str, float], effect: str, side: str,
                                            parameter: str) -> None:
-    said = (worn() if changes == WORN else changed(changes)).diagnosis
+    said = (worn() if changes == WORN else changed(changes, 7)).diagnosis
     (finding,) = said.findings
     assert (finding.effect, finding.side, finding.onset) == (effect, side, None)
     number = next(one for one in finding.parameters if one.name == parameter)
@@ -280,15 +280,16 @@ def test_an_imu_that_is_late_is_one_change_without_a_pose() -> None:
 
 def test_the_order_of_recordings_does_not_matter() -> None:
     """With a shifted centre of mass, whose two names are nearly the same."""
-    before = [driven('base1', {}, 1), driven('base2', {}, 2, OTHER)]
-    later = [driven('rec1', {'com_x': -0.05}, 3, OTHER), driven('rec2', {'com_x': -0.05}, 4)]
-    (one,), (other,) = (said_of(a, b).decisions for a, b in (
+    one, other, moved = DRIVE[:7], OTHER[:7], {'com_x': -0.05}
+    before = [driven('base1', {}, 1, one), driven('base2', {}, 2, other)]
+    later = [driven('rec1', moved, 3, other), driven('rec2', moved, 4, one)]
+    (first,), (second,) = (said_of(a, b).decisions for a, b in (
         (later, before), (later[::-1], before[::-1])))
-    assert one.named is not None
-    assert other.named is not None
-    assert one.named.change == other.named.change
-    assert one.named.gain == pytest.approx(other.named.gain, rel=1e-3)
-    assert one.confidence == pytest.approx(other.confidence, abs=1e-3)
+    assert first.named is not None
+    assert second.named is not None
+    assert first.named.change == second.named.change
+    assert first.named.gain == pytest.approx(second.named.gain, rel=1e-3)
+    assert first.confidence == pytest.approx(second.confidence, abs=1e-3)
 
 
 def test_the_model_that_is_written_drives_like_the_robot_after() -> None:
