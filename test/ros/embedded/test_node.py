@@ -91,6 +91,7 @@ def test_the_graph_is_announced(graph: None) -> None:
     assert announced().node_entities_info_seq == []
 
 
+@pytest.mark.realtime
 def test_timers_keep_their_period_on_average(graph: None) -> None:
     """A timer neither drifts nor makes up missed calls in a burst."""
     node = Node('timed')
@@ -200,6 +201,7 @@ def test_simulated_time_follows_the_clock_topic(graph: None) -> None:
         assert node.get_clock().now() == Time(seconds=second)
 
 
+@pytest.mark.realtime
 def test_shutdown_ends_spinning(graph: None) -> None:
     """Spinning stops with ExternalShutdownException when the context goes."""
     node = Node('spinner')
