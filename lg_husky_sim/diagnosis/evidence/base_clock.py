@@ -4,37 +4,32 @@
 Bases that apply commands at their own ticks, not when they come.
 
 The command with the stamp t_i is applied at the next tick, ``(phase - t_i) mod period`` later, and
-of several between two ticks the last one counts. With the change c_i of the readings for each
-second that a step of the commands comes later, the residuals r of a simulation that applies all as
-they come are those of delays d_i, which vary by s, by::
-
-    |r - C d|^2 = |r|^2 - 2 b'd + d'G d,   b = C'r,   G = C'C,   d = (G + I/s^2)^-1 b
-
-Their first harmonic, ``period / pi * sin(2 pi (t_i - phase) / period)``, stands out of their
-spectrum over the stamps at the base's rate. What is linear here finds rates and phases to begin
-with; which of them it is, simulations say.
+of several between two ticks the last one counts. The first harmonic of these delays, ``period / pi
+* sin(2 pi (t_i - phase) / period)``, stands out of their spectrum over the stamps at the base's
+rate, and at those that are the same to commands with a rate of their own. A base has one rate in
+all recordings, one phase in each. The linear problem of the delays
+(:mod:`~lg_husky_sim.diagnosis.evidence.command_steps`) finds rates and phases to begin with;
+which of them they are, simulations say.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+import functools
+import operator
 
-from lg_husky_sim.diagnosis.evidence.drives import Channel, Clock, Drive
+from lg_husky_sim.diagnosis.evidence.command_steps import rated, scaled, Steps, steps_of
+from lg_husky_sim.diagnosis.evidence.drives import Clock, Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import observe, simulate
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, TimeSeries
+from lg_husky_sim.threads import Threads
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import next_fast_len
-from scipy.sparse import csc_matrix, identity
-from scipy.sparse.linalg import spsolve
-
-_RATES = (Channel.WHEEL_LEFT, Channel.WHEEL_RIGHT, Channel.YAW_RATE)
-_ANGLES = (Channel.ANGLE_LEFT, Channel.ANGLE_RIGHT)
 
 
 def at_ticks(commands: TimeSeries, period: float, phase: float) -> TimeSeries:
@@ -58,162 +53,9 @@ def at_ticks(commands: TimeSeries, period: float, phase: float) -> TimeSeries:
     return TimeSeries(phase + period * number[last], commands.values[last], commands.names)
 
 
-@dataclass(frozen=True, eq=False)
-class Steps:
-    """
-    What the readings of a drive say of when each step of its commands came.
-
-    Parameters
-    ----------
-    stamps : numpy.ndarray, shape (n,)
-        [s]
-    slope : numpy.ndarray, shape (n,)
-        The b of the module's formula [1/s].
-    curvature : scipy.sparse.csc_matrix, shape (n, n)
-        Its G [1/s^2].
-    delays : numpy.ndarray, shape (n,)
-        Its d, against the delay of the log [s].
-    weights : numpy.ndarray, shape (n,)
-        How much of each delay comes from the readings, and not from the prior (0 to 1).
-    scales : list of float
-        One over the standard deviation of the residuals of each rate.
-    """
-
-    stamps: FloatArray
-    slope: FloatArray
-    curvature: csc_matrix
-    delays: FloatArray
-    weights: FloatArray
-    scales: list[float]
-
-    @property
-    def late(self) -> float:
-        """The mean delay [s]."""
-        return float(self.weights @ self.delays / np.sum(self.weights))
-
-    def clock(self, periods: FloatArray, count: int, known: float | None = None) -> Clock:
-        """
-        Return the likeliest clock of some periods and of so many phases, by the linear problem.
-
-        Parameters
-        ----------
-        periods : numpy.ndarray, shape (n,)
-            [s]
-        count : int
-        known : float, optional
-            How late commands act beside [s]; the likeliest of each clock if not given.
-
-        Returns
-        -------
-        Clock
-        """
-        one = np.ones(self.stamps.size)
-        whole = self.curvature @ one
-        stiffness = float(one @ whole)
-        best, found = np.inf, Clock(0.0, 0.0, 0.0)
-        for period in periods.tolist():
-            phases = self.stamps[0] + period * np.arange(count) / count
-            ticks = np.mod(phases - self.stamps[:, None], period)
-            late = (one @ self.slope - whole @ ticks) / stiffness
-            apart = 0.0 if known is None else known - late
-            cost = (0.5 * np.sum(ticks * (self.curvature @ ticks), axis=0) - self.slope @ ticks
-                    - 0.5 * stiffness * (late ** 2 - apart ** 2))
-            place = int(np.argmin(cost))
-            if cost[place] < best:
-                best, found = float(cost[place]), Clock(
-                    period, float(phases[place]), float(late[place]) if known is None else known)
-        return found
-
-
-def _rated(drive: Drive, values: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-    # Rates of wheels and yaw, or what angles change by, each with its times.
-    found = []
-    for channel in (*_RATES, *_ANGLES):
-        rows = drive.slice_of(channel)
-        if rows.stop > rows.start:
-            own, times = values[rows], drive.times[rows]
-            found.append((own, times) if channel in _RATES else (np.diff(own), times[1:]))
-    return found
-
-
-def _scaled(rates: Sequence[tuple[FloatArray, FloatArray]], scales: Sequence[float]) -> FloatArray:
-    return np.concatenate([own * scale for (own, _), scale in zip(rates, scales, strict=True)])
-
-
-def _late(commands: TimeSeries, chosen: NDArray[np.intp], by: float) -> TimeSeries:
-    # Commands of which some steps come later, the others when they do.
-    times, values = commands.times, commands.values
-    steps = np.diff(values, axis=0, prepend=values[:1])
-    every = np.unique(np.concatenate([times, times[chosen] + by]))
-    held = values[np.searchsorted(times, every, side='right') - 1].copy()
-    for k in chosen:
-        missing = (every >= times[k]) & (every < times[k] + by)
-        held[missing] -= steps[k]
-    return TimeSeries(every, held, commands.names)
-
-
-def steps_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Steps | None:
-    """
-    Return when each step of a drive's commands seems to have come.
-
-    Parameters
-    ----------
-    plant : Plant
-        As it is in the drive's recording.
-    drive : Drive
-        With the commands as they come.
-    log : Reading
-    spread : float
-        What delays vary by [s].
-
-    Returns
-    -------
-    Steps or None
-        None where no rate or no step of a command is known, or none shows in a rate.
-    """
-    commands = drive.commands
-    moved = np.flatnonzero(np.any(np.diff(commands.values, axis=0) != 0.0, axis=1)) + 1
-    moved = moved[(commands.times[moved] > drive.start) & (commands.times[moved] < drive.end)]
-    plain = observe(simulate(plant, drive, log), drive, log)
-    rates = _rated(drive, drive.measured - plain)
-    if moved.size < int(setting('clock_steps')) or not rates:
-        return None
-    # Of what is steady, for the linear problem.
-    scales = [1.0 / max(float(np.median(np.abs(own))), 1e-9) for own, _ in rates]
-    residual, times = _scaled(rates, scales), np.concatenate([at for _, at in rates])
-    window, by = setting('clock_window'), setting('clock_step')
-    usual = float(np.median(np.diff(commands.times[moved])))
-    count = max(2, int(np.ceil((window + by) / usual)))
-    order = np.argsort(times, kind='stable')
-    stamps = commands.times[moved]
-    delay = log.get('command_delay')
-    rows, columns, values = [], [], []
-    for first in range(count):
-        chosen = np.arange(first, moved.size, count)
-        later = replace(drive, commands=_late(commands, moved[chosen], by))
-        change = _scaled(_rated(drive, observe(
-            simulate(plant, later, log), later, log) - plain), scales) / by
-        for k in chosen:
-            begin, end = np.searchsorted(times[order], stamps[k] + delay + np.array([
-                -log.get('wheel_window'), window]))
-            own = order[begin:end]
-            rows.append(own)
-            columns.append(np.full(own.size, k))
-            values.append(change[own])
-    matrix = csc_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
-                        shape=(residual.size, moved.size))
-    if not matrix.count_nonzero():
-        return None
-    curvature = (matrix.T @ matrix).tocsc()
-    slope = np.asarray(matrix.T @ residual).ravel()
-    delays = spsolve(curvature + identity(moved.size, format='csc') / spread ** 2, slope)
-    known = curvature.diagonal()
-    return Steps(stamps, slope, curvature, delays, known / (known + 1.0 / spread ** 2),
-                 [1.0 / max(float(np.std(own)), 1e-9) for own, _ in rates])
-
-
-def _promising(steps: Sequence[Steps]) -> FloatArray:
-    # Rates at which the spectra of delays and slopes stand out, strongest first [Hz].
+def _promising(steps: Sequence[Steps]) -> list[float]:
+    # Rates at which the spectra of delays and slopes stand out, strongest first, each with those
+    # that are the same where commands change at a rate of their own [Hz].
     longest = max(float(np.ptp(one.stamps)) for one in steps)
     # Of stamps on a grid that is fine for the shortest period; lines as near as drives tell apart.
     grid = setting('clock_shortest') / setting('clock_grid')
@@ -221,7 +63,7 @@ def _promising(steps: Sequence[Steps]) -> FloatArray:
     first = int(np.ceil(grid * count / setting('clock_longest')))
     last = int(grid * count / setting('clock_shortest'))
     rates = np.arange(first, last) / (grid * count)
-    found = []
+    found: list[list[float]] = []
     for seen in ([one.weights * (one.delays - one.late) for one in steps],
                  [one.slope - np.mean(one.slope) for one in steps]):
         power = np.zeros(rates.size)
@@ -231,8 +73,15 @@ def _promising(steps: Sequence[Steps]) -> FloatArray:
             power += np.abs(lines) ** 2 / max(float(np.sum(values ** 2)), 1e-300)
         peak = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
         found.append(rates[peak[np.argsort(-power[peak], kind='stable')][
-            :int(setting('clock_rates'))]])
-    return np.unique(np.concatenate(found))
+            :int(setting('clock_peaks'))]].tolist())
+    own = 1.0 / float(np.median(np.concatenate([np.diff(one.stamps) for one in steps])))
+    strongest = [both for pair in zip(*found, strict=False) for both in pair]
+    if own < rates[0]:
+        return strongest
+    most = 1 + int(rates[-1] / own)
+    alike = [abs(rate + own * turn) for rate in strongest[:int(setting('clock_rivals'))]
+             for turn in range(-most, most + 1)]
+    return [*strongest, *(rate for rate in alike if rates[0] <= rate <= rates[-1])]
 
 
 def _ticked(drive: Drive, clock: Clock) -> Drive:
@@ -280,57 +129,137 @@ class Ticker:
     log: Reading
     steps: Steps
 
+    @functools.cached_property
+    def plain(self) -> float:
+        """The cost without a clock."""
+        return self.cost(None)
+
     def cost(self, clock: Clock | None) -> float:
         """Return the negative log likelihood of rates with a clock or none, to a constant."""
         held, log = self.drive, self.log
         if clock is not None:
             held = _ticked(held, clock)
             log = log.replacing({'command_delay': log.get('command_delay') + clock.late})
-        left = _scaled(_rated(held, held.measured - observe(
+        left = scaled(rated(held, held.measured - observe(
             simulate(self.plant, held, log), held, log)), self.steps.scales)
         nu = setting('student')
         return 0.5 * (nu + 1.0) * float(np.sum(np.log1p(left ** 2 / nu)))
 
-    def at_rate(self, rate: float) -> tuple[float, Clock]:
-        """Return the cost and the likeliest clock of a base at a rate [Hz]."""
-        # Up to a drift over the drive of a third of a period.
-        drift = np.linspace(-0.3, 0.3, 7) / (rate * float(np.ptp(self.steps.stamps)))
-        clock = self.steps.clock((1.0 + drift) / rate, int(setting('clock_phases')))
-        return self.cost(clock), clock
 
-    def sharpened(self, clock: Clock, late: float) -> Clock:
-        """Return the likeliest clock near one whose commands act so late beside."""
-        drift = 0.1 * clock.period / float(np.ptp(self.steps.stamps))
-        return self.steps.clock(clock.period * (1.0 + drift * np.linspace(-1.0, 1.0, 9)),
-                                8 * int(setting('clock_phases')), late)
+def _same_rate(known: Mapping[str, Sequence[Ticker]], periods: FloatArray,
+               count: int) -> dict[str, Clock]:
+    # The likeliest clock of each recording by the linear problem: one rate and one lateness of
+    # all, as one base has, one phase of each.
+    origins = {name: float(own[0].steps.stamps[0]) for name, own in known.items()}
+    fitted = {name: functools.reduce(operator.add, [
+        one.steps.fitted(periods, origins[name], count) for one in own])
+        for name, own in known.items()}
+    whole = sum(one.stiffness for one in fitted.values())
+    each, found = np.arange(periods.size), []
+    for first in fitted.values():
+        late = first.late[each, np.argmin(first.cost, axis=1)]
+        for _ in range(int(setting('clock_turns'))):
+            chosen = {name: one.phases(late)[0] for name, one in fitted.items()}
+            late = sum((one.stiffness * one.late[each, chosen[name]]
+                        for name, one in fitted.items()), np.zeros(periods.size)) / whole
+        cost = sum((one.phases(late)[1] for one in fitted.values()), np.zeros(periods.size))
+        place = int(np.argmin(cost))
+        found.append((float(cost[place]), float(periods[place]), float(late[place]),
+                      {name: int(one.phases(late)[0][place]) for name, one in fitted.items()}))
+    _, period, late_by, phases = min(found, key=lambda one: one[0])
+    return {name: Clock(period, origins[name] + period * phase / count, late_by)
+            for name, phase in phases.items()}
 
 
-def likeliest(tickers: Sequence[Ticker]) -> list[Clock]:
+@dataclass(frozen=True, eq=False)
+class Base:
     """
-    Return the likeliest clock of a base in each of its drives: one rate, any phase.
+    Looks for the clock of a base: one rate in all recordings, one phase in each.
 
     Parameters
     ----------
     tickers : sequence of Ticker
         One a drive.
-
-    Returns
-    -------
-    list of Clock
+    pool : Threads
     """
-    found = [[ticker.at_rate(rate) for ticker in tickers]
-             for rate in _promising([ticker.steps for ticker in tickers]).tolist()]
-    best = min(found, key=lambda tried: sum(cost for cost, _ in tried))
-    # As late beside in all drives.
-    late = float(np.average([clock.late for _, clock in best], weights=[
-        float(np.sum(ticker.steps.weights)) for ticker in tickers]))
-    return [ticker.sharpened(clock, late) for ticker, (_, clock) in zip(
-        tickers, best, strict=True)]
+
+    tickers: Sequence[Ticker]
+    pool: Threads
+
+    @functools.cached_property
+    def recordings(self) -> dict[str, list[Ticker]]:
+        """The drives of each."""
+        found: dict[str, list[Ticker]] = {}
+        for ticker in self.tickers:
+            found.setdefault(ticker.drive.recording, []).append(ticker)
+        return found
+
+    @functools.cached_property
+    def longest(self) -> float:
+        """How long commands go on in the longest recording [s]."""
+        return float(max(own[-1].steps.stamps[-1] - own[0].steps.stamps[0]
+                         for own in self.recordings.values()))
+
+    def gain(self, clocks: Mapping[str, Clock]) -> float:
+        """Return what rates gain by clocks, in nats."""
+        return sum(one.plain - one.cost(clocks[one.drive.recording]) for one in self.tickers)
+
+    def _apart(self, rates: Sequence[float]) -> list[float]:
+        # Without those that the longest recording cannot tell from one before.
+        found: list[float] = []
+        for rate in rates:
+            if all(abs(rate - one) * self.longest > 0.5 for one in found):
+                found.append(rate)
+        return found
+
+    def likeliest(self) -> list[dict[str, Clock]]:
+        """Return the likeliest clocks by recordings at each rate that stands out, best first."""
+        rates = self._apart(_promising([one.steps for one in self.tickers]))
+        found = _best(self.pool.map(self._tried, rates), 'clock_rates')
+        for drift, part, kept in ((0.3, 0.2, 'clock_rivals'), (0.15, 0.1, 'clock_rivals'),
+                                  (0.05, 0.033, 'clock_rivals')):
+            found = _best((self.sharpened(clocks, drift, part) for _, clocks in found), kept)
+        return [clocks for gain, clocks in found if gain > 0.0]
+
+    def _tried(self, rate: float) -> tuple[float, dict[str, Clock]]:
+        drift = 0.3 * np.linspace(-1.0, 1.0, 5) / self.longest
+        clocks = _same_rate(self.recordings, (1.0 + drift / rate) / rate,
+                            int(setting('clock_phases')))
+        return self.gain(clocks), clocks
+
+    def sharpened(self, clocks: Mapping[str, Clock], drift: float,
+                  part: float) -> tuple[float, dict[str, Clock]]:
+        """Return the likeliest clocks near some, by simulation, and what rates gain by them."""
+        # By recording: clocks, and what each of them gains.
+        steps = np.linspace(-1.0, 1.0, int(setting('clock_parts')))
+        tried = {name: [[_moved(clocks[name], own, drift * turn / self.longest, part * later)
+                         for later in steps] for turn in steps]
+                 for name, own in self.recordings.items()}
+        gains = {name: np.array([list(self.pool.map(
+            lambda clock, own=own: sum(one.plain - one.cost(clock) for one in own), held))
+            for held in tried[name]]) for name, own in self.recordings.items()}
+        rate = int(np.argmax(sum(np.max(own, axis=1) for own in gains.values())))
+        return float(sum(np.max(own[rate]) for own in gains.values())), {
+            name: tried[name][rate][int(np.argmax(own[rate]))] for name, own in gains.items()}
 
 
-def ticking(evidence: Evidence, fit: Fit) -> list[Drive] | None:
+def _best(tried: Iterable[tuple[float, dict[str, Clock]]],
+          name: str) -> list[tuple[float, dict[str, Clock]]]:
+    # As many as a setting says that gain most.
+    return sorted(tried, key=lambda one: -one[0])[:int(setting(name))]
+
+
+def _moved(clock: Clock, drives: Sequence[Ticker], drift: float, part: float) -> Clock:
+    # A clock that drifts by parts of a period in a second, and ticks a part later in the middle.
+    middle = 0.5 * (drives[0].steps.stamps[0] + drives[-1].steps.stamps[-1])
+    tick = clock.phase + clock.period * round((middle - clock.phase) / clock.period)
+    return Clock(clock.period * (1.0 + drift * clock.period), tick + part * clock.period,
+                 clock.late)
+
+
+def ticking(evidence: Evidence, fit: Fit) -> list[list[Drive]]:
     """
-    Return drives with commands at the likeliest ticks of their base.
+    Return drives with commands at the likeliest ticks of their base, at one rate after another.
 
     Parameters
     ----------
@@ -340,24 +269,22 @@ def ticking(evidence: Evidence, fit: Fit) -> list[Drive] | None:
 
     Returns
     -------
-    list of Drive or None
-        None where commands jitter too little for it, are at ticks already, no drive tells, or
-        rates are likelier without ticks.
+    list of list of Drive
+        Those that differ most from none first. Empty where commands jitter too little for it, are
+        at ticks already, no drive tells, or rates are likelier without ticks.
         Whether these ticks make the drives likelier than none is for a fit to say.
     """
     spread = evidence.noise.values['command_jitter']
     if spread < setting('clock_shows') or any(d.clock for d in evidence.drives):
-        return None
+        return []
     log = fit.point.log
     plants = evidence.plants(fit.point.plant)
     plain = [replace(d, commands=d.logged) for d in evidence.drives]
     steps = evidence.pool.map(lambda pair: steps_of(pair[0], pair[1], log, spread),
                               zip(plants, plain, strict=True))
-    tickers = {k: Ticker(plants[k], plain[k], log, one) for k, one in enumerate(steps)
-               if one is not None}
+    tickers = [Ticker(plant, drive, log, one) for plant, drive, one in zip(
+        plants, plain, steps, strict=True) if one is not None]
     if not tickers:
-        return None
-    clocks = dict(zip(tickers, likeliest(list(tickers.values())), strict=True))
-    if sum(t.cost(clocks[k]) - t.cost(None) for k, t in tickers.items()) >= 0.0:
-        return None
-    return [_ticked(drive, clocks[k]) if k in clocks else drive for k, drive in enumerate(plain)]
+        return []
+    return [[_ticked(drive, clocks[drive.recording]) if drive.recording in clocks else drive
+             for drive in plain] for clocks in Base(tickers, evidence.pool).likeliest()]

@@ -141,8 +141,8 @@ class Drive:
 
     @property
     def late(self) -> str:
-        """Name of how much later than at the likeliest phase its base ticks."""
-        return f'tick_delay {self.name}'
+        """Name of how much later than at the likeliest phase the base ticks in its recording."""
+        return f'tick_delay {self.recording}'
 
     @property
     def own_lag(self) -> str:

@@ -183,11 +183,10 @@ def base_unknowns(parameters: Parameters, drives: Sequence[Drive]) -> tuple[Unkn
 
 
 def tick_unknowns(drives: Sequence[Drive]) -> tuple[Unknown, ...]:
-    """Return how much later than at the likeliest phase the base ticks, in each drive."""
-    return tuple(
-        log_unknown(d.late, 0.0, own, -0.5 * d.clock.period, 0.5 * d.clock.period)
-        for d in drives if d.clock is not None
-        for own in (setting('clock_phase') * d.clock.period,))
+    """Return how much later than at the likeliest phase the base ticks, in each recording."""
+    periods = {d.late: d.clock.period for d in drives if d.clock is not None}
+    return tuple(log_unknown(name, 0.0, setting('clock_phase') * period, -0.5 * period,
+                             0.5 * period) for name, period in periods.items())
 
 
 def loosened(unknowns: Sequence[Unknown], jitter: Mapping[str, float]) -> tuple[Unknown, ...]:

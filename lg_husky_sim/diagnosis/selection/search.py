@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.decision.adoption import gain_of_laws, least_beside
 from lg_husky_sim.diagnosis.evidence.base_clock import ticking
+from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
@@ -250,20 +251,25 @@ def recalibrated(evidence: Evidence, start: Point) -> Recalibrated:
 
 def at_ticks(known: Recalibrated, start: Point, progress: Progress) -> Recalibrated | None:
     """Return the same of a base that applies commands at its own ticks, if that is likelier."""
-    drives = ticking(known.evidence, known.base)
-    if drives is None:
+    rivals = ticking(known.evidence, known.base)
+    if not rivals:
         return None
     progress('update rate of the base', 0.08)
-    own = tick_unknowns(drives)
 
-    def ticked(evidence: Evidence, point: Point) -> tuple[Evidence, Point]:
+    def ticked(evidence: Evidence, point: Point,
+               drives: Sequence[Drive]) -> tuple[Evidence, Point]:
+        own = tick_unknowns(drives)
         wider = replace(point, unknowns=(*point.unknowns, *own),
                         places=np.append(point.places, start_of(own)))
         return evidence_of(drives, evidence.names, wider, evidence.noise, evidence.pool), wider
-    near = calibrated(*ticked(known.evidence, known.base.point), 1)
-    if not ticks_are_likelier((known.evidence, known.base), near, drives):
+    # From where delays have not taken their place.
+    afresh = [calibrated(*ticked(known.first, start, drives), 1) for drives in rivals]
+    costs = [evidence.surprise(fit) for evidence, fit in afresh]
+    best = costs.index(min(costs))
+    drives = rivals[best]
+    if not ticks_are_likelier((known.evidence, known.base), afresh[best], drives):
         return None
-    other = recalibrated(*ticked(known.first, start))
+    other = recalibrated(*ticked(known.first, start, drives))
     # What is distorted with them, too, lacks something else, which they may be a part of.
     return None if is_distorted(other.base) else other
 

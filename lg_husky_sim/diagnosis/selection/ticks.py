@@ -52,11 +52,10 @@ def gain_by_chance(drives: Sequence[Drive]) -> float:
     """
     Return what ticks gain on a base without any, once in as many as false alarms are allowed.
 
-    In a drive that lasts T, rates 1/T apart and phases a deviation d of the phase apart are trials
-    of their own: for rates from f1 to f2 there are N = T (f2 - f1) / d, and ticks of none of them
-    gain more than::
+    Rates 1/T apart, in a recording that lasts T, and phases a deviation d of the phase apart are
+    trials of their own. For rates from f1 to f2, ticks of none of them gain more than::
 
-        log N, summed over the drives, - log(rate of false alarms)
+        log(T (f2 - f1)) - log(d), summed over the recordings, - log(rate of false alarms)
 
     Parameters
     ----------
@@ -69,6 +68,9 @@ def gain_by_chance(drives: Sequence[Drive]) -> float:
         [nats].
     """
     band = 1.0 / setting('clock_shortest') - 1.0 / setting('clock_longest')
-    trials = [(d.end - d.start) * band / setting('clock_phase')
-              for d in drives if d.clock is not None]
-    return sum(math.log(max(n, 1.0)) for n in trials) - math.log(setting('false_alarm_rate'))
+    ticking = [d for d in drives if d.clock is not None]
+    names = {d.recording for d in ticking}
+    longest = max(max(d.end for d in ticking if d.recording == name)
+                  - min(d.start for d in ticking if d.recording == name) for name in names)
+    return (math.log(max(longest * band, 1.0)) - len(names) * math.log(setting('clock_phase'))
+            - math.log(setting('false_alarm_rate')))

@@ -1,0 +1,209 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the readings of a drive say of when each step of its commands came.
+
+With the change c_i of the readings for each second that a step of the commands comes later, the
+residuals r of a simulation that applies all as they come are those of delays d_i, which vary by
+s, by::
+
+    |r - C d|^2 = |r|^2 - 2 b'd + d'G d,   b = C'r,   G = C'C,   d = (G + I/s^2)^-1 b
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
+from lg_husky_sim.diagnosis.evidence.observation import observe, simulate
+from lg_husky_sim.diagnosis.evidence.reading import Reading
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.signals import FloatArray, TimeSeries
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix, identity
+from scipy.sparse.linalg import spsolve
+
+_RATES = (Channel.WHEEL_LEFT, Channel.WHEEL_RIGHT, Channel.YAW_RATE)
+_ANGLES = (Channel.ANGLE_LEFT, Channel.ANGLE_RIGHT)
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """
+    What the readings of a drive say of when each step of its commands came.
+
+    Parameters
+    ----------
+    stamps : numpy.ndarray, shape (n,)
+        [s]
+    slope : numpy.ndarray, shape (n,)
+        The b of the module's formula [1/s].
+    curvature : scipy.sparse.csc_matrix, shape (n, n)
+        Its G [1/s^2].
+    delays : numpy.ndarray, shape (n,)
+        Its d, against the delay of the log [s].
+    weights : numpy.ndarray, shape (n,)
+        How much of each delay comes from the readings, and not from the prior (0 to 1).
+    scales : list of float
+        One over the standard deviation of the residuals of each rate.
+    """
+
+    stamps: FloatArray
+    slope: FloatArray
+    curvature: csc_matrix
+    delays: FloatArray
+    weights: FloatArray
+    scales: list[float]
+
+    @property
+    def late(self) -> float:
+        """The mean delay [s]."""
+        return float(self.weights @ self.delays / np.sum(self.weights))
+
+    def fitted(self, periods: FloatArray, origin: float, count: int) -> Fitted:
+        """
+        Return how well clocks of some periods and of so many phases fit, by the linear problem.
+
+        Parameters
+        ----------
+        periods : numpy.ndarray, shape (n,)
+            [s]
+        origin : float
+            Phases are counted from here [s].
+        count : int
+
+        Returns
+        -------
+        Fitted
+        """
+        one = np.ones(self.stamps.size)
+        whole = self.curvature @ one
+        stiffness = float(one @ whole)
+        phases = origin + periods[:, None] * np.arange(count) / count
+        ticks = np.mod(phases.ravel() - self.stamps[:, None], np.repeat(periods, count))
+        late = (one @ self.slope - whole @ ticks) / stiffness
+        cost = (0.5 * np.sum(ticks * (self.curvature @ ticks), axis=0) - self.slope @ ticks
+                - 0.5 * stiffness * late ** 2)
+        return Fitted(cost.reshape(phases.shape), late.reshape(phases.shape), stiffness)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """
+    How well clocks fit: what they cost where commands are late by l beside, K/2 (l - late)^2 more.
+
+    Parameters
+    ----------
+    cost, late : numpy.ndarray, shape (periods, phases)
+        At the likeliest lateness, and that [s].
+    stiffness : float
+        K [1/s^2].
+    """
+
+    cost: FloatArray
+    late: FloatArray
+    stiffness: float
+
+    def __add__(self, other: Fitted) -> Fitted:
+        """Return how well the same clocks fit both, as late."""
+        whole = self.stiffness + other.stiffness
+        late = (self.stiffness * self.late + other.stiffness * other.late) / whole
+        apart = self.stiffness * other.stiffness / whole * (self.late - other.late) ** 2
+        return Fitted(self.cost + other.cost + 0.5 * apart, late, whole)
+
+    def phases(self, late: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+        """Return the likeliest phase of each period, as late as given for it, and its cost."""
+        cost = self.cost + 0.5 * self.stiffness * (late[:, None] - self.late) ** 2
+        best = np.argmin(cost, axis=1)
+        return best, np.take_along_axis(cost, best[:, None], axis=1)[:, 0]
+
+
+def rated(drive: Drive, values: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    """Return rates of wheels and yaw, or what angles change by, each with its times."""
+    found = []
+    for channel in (*_RATES, *_ANGLES):
+        rows = drive.slice_of(channel)
+        if rows.stop > rows.start:
+            own, times = values[rows], drive.times[rows]
+            found.append((own, times) if channel in _RATES else (np.diff(own), times[1:]))
+    return found
+
+
+def scaled(rates: Sequence[tuple[FloatArray, FloatArray]], scales: Sequence[float]) -> FloatArray:
+    """Return all of them in one, each over its scale."""
+    return np.concatenate([own * scale for (own, _), scale in zip(rates, scales, strict=True)])
+
+
+def _late(commands: TimeSeries, chosen: NDArray[np.intp], by: float) -> TimeSeries:
+    # Commands of which some steps come later, the others when they do.
+    times, values = commands.times, commands.values
+    steps = np.diff(values, axis=0, prepend=values[:1])
+    every = np.unique(np.concatenate([times, times[chosen] + by]))
+    held = values[np.searchsorted(times, every, side='right') - 1].copy()
+    for k in chosen:
+        missing = (every >= times[k]) & (every < times[k] + by)
+        held[missing] -= steps[k]
+    return TimeSeries(every, held, commands.names)
+
+
+def steps_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Steps | None:
+    """
+    Return when each step of a drive's commands seems to have come.
+
+    Parameters
+    ----------
+    plant : Plant
+        As it is in the drive's recording.
+    drive : Drive
+        With the commands as they come.
+    log : Reading
+    spread : float
+        What delays vary by [s].
+
+    Returns
+    -------
+    Steps or None
+        None where no rate or no step of a command is known, or none shows in a rate.
+    """
+    commands = drive.commands
+    moved = np.flatnonzero(np.any(np.diff(commands.values, axis=0) != 0.0, axis=1)) + 1
+    moved = moved[(commands.times[moved] > drive.start) & (commands.times[moved] < drive.end)]
+    plain = observe(simulate(plant, drive, log), drive, log)
+    rates = rated(drive, drive.measured - plain)
+    if moved.size < int(setting('clock_steps')) or not rates:
+        return None
+    # Of what is steady, for the linear problem.
+    scales = [1.0 / max(float(np.median(np.abs(own))), 1e-9) for own, _ in rates]
+    residual, times = scaled(rates, scales), np.concatenate([at for _, at in rates])
+    window, by = setting('clock_window'), setting('clock_step')
+    usual = float(np.median(np.diff(commands.times[moved])))
+    count = max(2, int(np.ceil((window + by) / usual)))
+    order = np.argsort(times, kind='stable')
+    stamps = commands.times[moved]
+    delay = log.get('command_delay')
+    rows, columns, values = [], [], []
+    for first in range(count):
+        chosen = np.arange(first, moved.size, count)
+        later = replace(drive, commands=_late(commands, moved[chosen], by))
+        change = scaled(rated(drive, observe(
+            simulate(plant, later, log), later, log) - plain), scales) / by
+        for k in chosen:
+            begin, end = np.searchsorted(times[order], stamps[k] + delay + np.array([
+                -log.get('wheel_window'), window]))
+            own = order[begin:end]
+            rows.append(own)
+            columns.append(np.full(own.size, k))
+            values.append(change[own])
+    matrix = csc_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+                        shape=(residual.size, moved.size))
+    if not matrix.count_nonzero():
+        return None
+    curvature = (matrix.T @ matrix).tocsc()
+    slope = np.asarray(matrix.T @ residual).ravel()
+    delays = spsolve(curvature + identity(moved.size, format='csc') / spread ** 2, slope)
+    known = curvature.diagonal()
+    return Steps(stamps, slope, curvature, delays, known / (known + 1.0 / spread ** 2),
+                 [1.0 / max(float(np.std(own)), 1e-9) for own, _ in rates])
