@@ -41,6 +41,10 @@ def _axes(axes: Any, count: int, what: str, height: float, share: bool = False) 
     return found
 
 
+def _lines(*texts: str) -> str:
+    return '\n'.join(filter(None, texts))
+
+
 def _titled(axis: Any, title: str) -> None:
     """Give axes a title, or take it from those that show something else already."""
     axis.set_title(title if axis.get_title() in ('', title) else '')
@@ -70,6 +74,8 @@ class StepResponse:
         The input.
     final : numpy.ndarray, shape (n_outputs,)
         What each output settles at, NaN where it does not.
+    left_out : str
+        What it is without, as it is not linear; '' for nothing.
     """
 
     times: FloatArray
@@ -79,6 +85,7 @@ class StepResponse:
     source: str
     source_unit: str
     final: FloatArray
+    left_out: str = ''
 
     def __post_init__(self) -> None:
         """Set the arrays read-only."""
@@ -181,7 +188,7 @@ class StepResponse:
             axis.grid(visible=True, alpha=0.4)
             if label:
                 axis.legend()
-        _titled(found[0], self._title)
+        _titled(found[0], _lines(self._title, self.left_out))
         found[-1].set_xlabel('time [s]')
         return np.array(found, dtype=object)
 
@@ -191,12 +198,12 @@ class StepResponse:
 
     def __str__(self) -> str:
         """Return the table as text."""
-        return f'{self._title}\n{self.table()}'
+        return f'{_lines(self._title, self.left_out)}\n{self.table()}'
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return page_part(self._title, [], [self.table()])
+        return page_part(self._title, [self.left_out] * bool(self.left_out), [self.table()])
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +221,8 @@ class FrequencyResponse:
         [deg], without jumps.
     output, source, unit : str
         Names, and the unit of output over input; '' if it has none.
+    left_out : str
+        What it is without, as it is not linear; '' for nothing.
     """
 
     rates: FloatArray
@@ -222,6 +231,7 @@ class FrequencyResponse:
     output: str
     source: str
     unit: str
+    left_out: str = ''
 
     def __post_init__(self) -> None:
         """Set the arrays read-only."""
@@ -280,7 +290,7 @@ class FrequencyResponse:
         _wide(found[1], LEAST_PHASE)
         low, high = found[1].get_ylim()
         found[1].yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
-        _titled(found[0], self._title)
+        _titled(found[0], _lines(self._title, self.left_out))
         found[1].set_xlabel('angular frequency [rad/s]')
         return np.array(found, dtype=object)
 
@@ -308,9 +318,9 @@ class FrequencyResponse:
 
     def __str__(self) -> str:
         """Return the table as text."""
-        return f'{self._title}\n{self.table()}'
+        return f'{_lines(self._title, self.left_out)}\n{self.table()}'
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return page_part(self._title, [], [self.table()])
+        return page_part(self._title, [self.left_out] * bool(self.left_out), [self.table()])

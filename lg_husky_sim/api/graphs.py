@@ -13,6 +13,7 @@ from typing import Any
 
 from lg_husky_sim.api.responses import Responses
 from lg_husky_sim.api.tables import page_part, Table
+from lg_husky_sim.api.transfer_functions import warn_of
 from lg_husky_sim.errors import GraphError, LgHuskyError, ParameterError
 from lg_husky_sim.linear_graph import (
     compile_numeric,
@@ -119,6 +120,18 @@ class Graph(Responses):
         """Names of the inputs."""
         return self.symbolic.inputs
 
+    @property
+    def left_out(self) -> str:
+        """What poles, transfer functions and responses are without; '' for nothing."""
+        with self._in_file():
+            efforts = compile_numeric(self.graph, self.outputs, chained=True).efforts
+        names = dict.fromkeys(self._owner(name) for name in efforts)
+        return f'Without {", ".join(names)}: not linear' if names else ''
+
+    def _owner(self, effort: str) -> str:
+        """Return what a user calls the source of an effort: here, the element itself."""
+        return effort
+
     def numeric(self, **values: float) -> StateSpace:
         """
         Return the model in numbers.
@@ -216,7 +229,7 @@ class Graph(Responses):
 
     def export(self, path: str | os.PathLike[str], **values: float) -> Path:
         """
-        Write A, B, C and D in numbers for other tools.
+        Write A, B, C and D in numbers for other tools, with the names of what is not linear.
 
         Parameters
         ----------
@@ -242,13 +255,15 @@ class Graph(Responses):
         return export(self.numeric(**values), path, self.name, {**self.values, **values})
 
     def to_control(self, **values: float) -> Any:
-        """Return the linear part in numbers as a python-control ``StateSpace``."""
+        """Return the linear part as a python-control ``StateSpace``, warning of what is not."""
         from lg_husky_sim.linear_graph.export import to_control
+        warn_of(self.left_out)
         return to_control(self.numeric(**values))
 
     def to_scipy(self, **values: float) -> Any:
-        """Return the linear part in numbers as a ``scipy.signal.StateSpace``."""
+        """Return the linear part as a ``scipy.signal.StateSpace``, warning of what is not."""
         from lg_husky_sim.linear_graph.export import to_scipy
+        warn_of(self.left_out)
         return to_scipy(self.numeric(**values))
 
     def _symbolic(self, by_parameter: bool) -> SymbolicStateSpace:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from lg_husky_sim.api.curves import FrequencyResponse, StepResponse
-from lg_husky_sim.api.transfer_functions import TransferFunction
+from lg_husky_sim.api.transfer_functions import TransferFunction, warn_of
 from lg_husky_sim.errors import GraphError
 from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, StateSpace
 import numpy as np
@@ -20,12 +20,19 @@ class Responses(ABC):
     """
     Answers of the linear part of a graph's model; laws that are not linear are left out.
 
-    Where the graph has one output or one input only, it need not be named.
+    Results say by name what they are without; those that cannot (symbols, and systems of other
+    tools) come with a warning. Where the graph has one output or one input only, it need not be
+    named.
     """
 
     graph: LinearGraph
     values: Mapping[str, float]
     outputs: tuple[str, ...]
+
+    @property
+    @abstractmethod
+    def left_out(self) -> str:
+        """What the answers are without, such as ``Without T_c: not linear``; '' for nothing."""
 
     @abstractmethod
     def numeric(self, **values: float) -> StateSpace:
@@ -52,7 +59,8 @@ class Responses(ABC):
         Returns
         -------
         sympy.Expr or TransferFunction
-            A fraction in ``s`` without common factors, in symbols by powers of ``s``.
+            A fraction in ``s`` without common factors, in symbols by powers of ``s``; of the
+            linear part alone (:attr:`left_out`).
 
         Raises
         ------
@@ -66,6 +74,7 @@ class Responses(ABC):
         if numbers or values:
             return self._in_numbers(output, source, values)
         from lg_husky_sim.linear_graph.transfer import transfer_function
+        warn_of(self.left_out)
         return transfer_function(self.graph, output, source, by_element=not by_parameter)
 
     def _in_numbers(self, output: str, source: str, values: Mapping[str, float]
@@ -74,10 +83,10 @@ class Responses(ABC):
         self.numeric(**values)      # refuses numbers that are missing or not allowed
         found = fraction_of(self.graph, output, source, {**self.values, **values})
         return TransferFunction(output, source, self._unit(output, source), found.numerator,
-                                found.denominator, found.zeros, found.poles)
+                                found.denominator, found.zeros, found.poles, self.left_out)
 
     def poles(self, **values: float) -> NDArray[np.complex128]:
-        """Return the eigenvalues of A [1/s], shape (n,), fastest first."""
+        """Return the eigenvalues of A [1/s], shape (n,), fastest first; of the linear part."""
         return self.numeric(**values).poles
 
     def zeros(self, output: str = '', source: str = '', **values: float
@@ -88,7 +97,10 @@ class Responses(ABC):
     def step(self, times: ArrayLike | None = None, output: str = '', source: str = '',
              **values: float) -> StepResponse:
         """
-        Return the outputs after a unit step of one input, from rest.
+        Return the outputs of the linear part after a unit step of one input, from rest.
+
+        What is not linear, as dry friction, is left out, and the result says so; with it,
+        integrate ``RightHandSide`` of ``lg_husky_sim.linear_graph.nonlinear``.
 
         Parameters
         ----------
@@ -129,12 +141,12 @@ class Responses(ABC):
                               for one in answers])
         return StepResponse(
             moments, found, space.outputs, tuple(map(self._unit, space.outputs)), source,
-            self._unit(source), final)
+            self._unit(source), final, self.left_out)
 
     def bode(self, rates: ArrayLike | None = None, output: str = '', source: str = '',
              **values: float) -> FrequencyResponse:
         """
-        Return gain [dB] and phase [deg] of a transfer function.
+        Return gain [dB] and phase [deg] of a transfer function, which is of the linear part.
 
         Parameters
         ----------
@@ -177,7 +189,8 @@ class Responses(ABC):
         else:
             found = found if fraction.gain else 0.0 * found     # rounding, where nothing arrives
             angles = phase_of(at, fraction.zeros, fraction.poles, fraction.gain)
-        return FrequencyResponse(at, found, angles, output, source, self._unit(output, source))
+        return FrequencyResponse(at, found, angles, output, source, self._unit(output, source),
+                                 self.left_out)
 
     def _names(self, output: str, source: str) -> tuple[str, str]:
         """Return the names of an output and an input; one that is alone need not be given."""

@@ -94,6 +94,16 @@ class Husky(Graph):
         """Effects of the catalogue that are in the model."""
         return self.model.structure.effects
 
+    @property
+    def left_out(self) -> str:
+        """What poles, transfer functions and responses are without; '' for nothing."""
+        beside = _beside_the_graph(self.model.structure)
+        outside = f'Without {", ".join(beside)}: outside the graph' if beside else ''
+        return '. '.join(filter(None, (super().left_out, outside)))
+
+    def _owner(self, effort: str) -> str:
+        return self.model.structure.owners()[effort].id
+
     @cached_property
     def plant(self) -> Plant:
         """The model ready to be stepped."""
@@ -313,10 +323,15 @@ def _values(model: ModelFile) -> Mapping[str, float]:
     return values
 
 
+def _beside_the_graph(structure: Structure) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(
+        effect.id for effect in structure.in_force()
+        if effect.kind.subsystem in (Subsystem.COMMAND, Subsystem.SENSOR)))
+
+
 def _note(structure: Structure) -> str:
     # Which effects are no part of the graph, and which of two graphs it is.
-    names = dict.fromkeys(effect.id for effect in structure.in_force() if effect.kind.subsystem
-                          in (Subsystem.COMMAND, Subsystem.SENSOR))
+    names = _beside_the_graph(structure)
     left_out = ('Not in the matrices and poles, which are those of the graph alone: '
                 f'{", ".join(names)}') if names else ''
     late = dict.fromkeys(effect.id for effect in structure.in_force() if effect.late)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
+import warnings
 
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.extras import require
@@ -37,6 +38,8 @@ class TransferFunction:
         Coefficients, highest power of s first; the denominator's first is 1.
     zeros, poles : numpy.ndarray of complex
         [1/s], fastest first.
+    left_out : str
+        What it is without, as it is not linear; '' for nothing.
     """
 
     output: str
@@ -46,6 +49,7 @@ class TransferFunction:
     denominator: FloatArray
     zeros: ComplexArray
     poles: ComplexArray
+    left_out: str = ''
 
     @property
     def gain(self) -> float:
@@ -72,6 +76,7 @@ class TransferFunction:
         """Return it as a python-control ``TransferFunction``."""
         require('control', 'make a python-control system')
         import control
+        warn_of(self.left_out)
         # control takes no dots in names
         return control.tf(self.numerator, self.denominator,
                           outputs=[self.output.replace('.', '_')], inputs=[self.source])
@@ -79,6 +84,7 @@ class TransferFunction:
     def to_scipy(self) -> Any:
         """Return it as a ``scipy.signal.TransferFunction``."""
         from scipy.signal import TransferFunction as Scipys
+        warn_of(self.left_out)
         return Scipys(self.numerator, self.denominator)
 
     def table(self) -> Table:
@@ -105,7 +111,8 @@ class TransferFunction:
         if len(self.denominator) == 1:
             lines = [above]
         table = [str(self.table())] * bool(len(self.poles) + len(self.zeros))
-        return '\n'.join([self._title, *(f'  {line}' for line in lines), self._dc, *table])
+        return '\n'.join([self._title, *[self.left_out] * bool(self.left_out),
+                          *(f'  {line}' for line in lines), self._dc, *table])
 
     __repr__ = __str__
 
@@ -121,8 +128,15 @@ class TransferFunction:
         above, below = (escape(polynomial_text(one)) for one in (self.numerator, self.denominator))
         fraction = ('<div style="display:inline-block;text-align:center">'
                     f'<div style="border-bottom:1px solid">{above}</div><div>{below}</div></div>')
-        return f'{page_part(self._title, [], [])}{fraction}' + page_part(
+        head = page_part(self._title, [self.left_out] * bool(self.left_out), [])
+        return f'{head}{fraction}' + page_part(
             '', [self._dc], [self.table()]).replace('<h4></h4>', '')
+
+
+def warn_of(left_out: str) -> None:
+    """Warn the caller's caller of what an answer that cannot say so is without."""
+    if left_out:
+        warnings.warn(left_out, stacklevel=3)
 
 
 def root_text(root: complex) -> str:

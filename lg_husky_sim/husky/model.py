@@ -91,9 +91,24 @@ class Structure:
         -------
         EditedNetwork
         """
-        graph = network.simplified() if self.drivetrain is Drivetrain.SIMPLIFIED else (
-            network.expanded())
-        edited, there = EditedNetwork(graph), self.in_force(late)
+        return [self._bare(), *(edited for _, edited in self._edits(late))][-1]
+
+    def owners(self) -> dict[str, Effect]:
+        """Return which effect each law of the edited graph belongs to, by the law's source."""
+        found: dict[str, Effect] = {}
+        for effect, edited in self._edits(late=True):
+            for name in edited.laws:
+                found.setdefault(name, effect)
+        return found
+
+    def _bare(self) -> EditedNetwork:
+        return EditedNetwork(network.simplified() if self.drivetrain is Drivetrain.SIMPLIFIED
+                             else network.expanded())
+
+    def _edits(self, late: bool) -> list[tuple[Effect, EditedNetwork]]:
+        """Return the effects that act in the order of their edits, each with the graph then."""
+        edited, there = self._bare(), self.in_force(late)
+        found: list[tuple[Effect, EditedNetwork]] = []
         for effect in there:
             needed = effect.kind.needs.get(effect.shape)
             if needed and all(other.id != needed for other in there):
@@ -101,7 +116,8 @@ class Structure:
                                      f'another one has; it needs {needed}')
         for effect in sorted(there, key=stage_of):
             edited = edit(edited, effect)
-        return edited
+            found.append((effect, edited))
+        return found
 
     def in_force(self, late: bool = True) -> tuple[Effect, ...]:
         """
