@@ -29,6 +29,7 @@ from lg_husky_sim.diagnosis.log_notes import log_notes, reading_notes
 from lg_husky_sim.diagnosis.model_mismatch import model_mismatch, ModelMismatch, unsearched
 from lg_husky_sim.diagnosis.nameless import described, left_over, remaining, unknown_finding
 from lg_husky_sim.diagnosis.result import Diagnosis, Rivalry, Verdict
+from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
 from lg_husky_sim.diagnosis.sensors.relations import relations
@@ -44,7 +45,6 @@ from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
-from lg_husky_sim.reporting.words import quantity_with_unit
 from lg_husky_sim.threads import threads
 
 
@@ -164,6 +164,7 @@ def _diagnosis(found: Search, left: Search, rest: Sequence[Effort], free: Sequen
     culprit = names[0].subsystem if names else None
     plain_out, augmented_out = held_out_errors(found, parts)
     about = '; '.join(f.statement for f in names) or 'recalibrated, nothing named'
+    nearest = _nearest(found) if said.verdict is Verdict.UNKNOWN else ''
     groups = indistinguishable(found) if said.verdict is Verdict.KNOWN else ()
     diagnosis = Diagnosis(
         said.verdict, said.sure, names, groups,
@@ -172,9 +173,10 @@ def _diagnosis(found: Search, left: Search, rest: Sequence[Effort], free: Sequen
         errors(found.plain.point.plant, parts),
         errors(found.final.point.plant, parts, found.evidence.names),
         plain_out, augmented_out, _remaining(found, rest),
-        model_of(found.final, found.evidence, nominal, about),
+        model_of(found.final, found.evidence, nominal, f'{about} {nearest}'.rstrip()),
         model_of(found.plain, found.evidence, nominal, 'recalibrated, nothing added'),
-        _notes(found, plain_out, augmented_out), asdict(said.features))
+        (*((nearest,) if nearest else ()), *_notes(found, plain_out, augmented_out)),
+        asdict(said.features))
     return diagnosis, said.features
 
 
@@ -206,11 +208,26 @@ def _remaining(found: Search, rest: Sequence[Effort]) -> str:
                     f'a log evidence of {first.evidence:.1f} nats')
     last = found.rounds[-1]
     if last.tried and not (found.found and last is found.rounds[len(found.found) - 1]):
-        best = last.tried[0]
-        text.append(f'the best further effect, {best.hypothesis.effect.id}, gains '
-                    f'{best.gain:.1f} nats; on a clean robot, a gain this large '
-                    f'has a probability of {last.chance:.2g}')
+        text.append(_refused(last))
     return '; '.join(text) or 'nothing beyond noise'
+
+
+def _refused(last: Round) -> str:
+    # Why the best effect that was looked at last is no finding.
+    best = last.tried[0]
+    gain = f'the best further effect, {best.hypothesis.effect.id}, gains {best.gain:.1f} nats, '
+    if last.chance > setting('false_alarm_rate'):
+        return gain + ('as chance alone gives it' if last.chance > 0.5 else
+                       f'which chance gives with a probability of {last.chance:.2g}')
+    return gain + ('more than chance gives, but too little beside what was found, too small to '
+                   'matter, or at single moments only')
+
+
+def _nearest(found: Search) -> str:
+    # What model.yaml has beside an unknown.
+    names = [hypothesis.effect.id for hypothesis in found.found]
+    return (f'model.yaml has the nearest effects of the catalogue, {", ".join(names)}, which do '
+            'not explain it' if names else '')
 
 
 def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
@@ -219,14 +236,11 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
     made = reading_notes(found.evidence.drives, found.final.point.log)
     worse = [name for name in plain if name in augmented
              and augmented[name] > (1.0 + setting('worse')) * plain[name]] if found.found else []
-    if worse:
-        notes.append('held-out errors that grow with the finding: '
-                     + ', '.join(f'{quantity_with_unit(name)} from {plain[name]:.3g} to '
-                                 f'{augmented[name]:.3g}' for name in worse))
     if any(name in worse and any(note.startswith(rates) for note in made) for name, rates in (
             ('wheel_speed_rmse', 'wheel rates'), ('yaw_rate_rmse', 'yaw rates'))):
-        notes.append('these are errors of the rates themselves, not of what this log makes of '
-                     'them (below), which numbers of the recalibrated model may stand for')
+        notes.append('held-out errors of rates that grow are those of the rates themselves, not '
+                     'of what this log makes of them (below), which numbers of the '
+                     'recalibrated model may stand for')
     most = setting('most_tolerances')
     moved = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.prior_residuals,
                                     strict=True) if abs(s) > most and u.kind == 'model']

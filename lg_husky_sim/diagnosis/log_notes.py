@@ -64,14 +64,16 @@ def reading_notes(drives: Sequence[Drive], reading: Reading) -> tuple[str, ...]:
     """
     notes, window = [], reading.get('wheel_window')
     rated = any(d.wheel_times.size and not d.counted for d in drives)
-    if rated and window > setting('shortest_window'):
+    # One that is as it began has not been found.
+    begun = (Reading().wheels, setting('wheel_window')) == (reading.wheels, window)
+    if rated and window > setting('shortest_window') and not begun:
         kind = {WheelReading.WINDOW_END: 'means over {} ms before their stamps',
                 WheelReading.WINDOW_MIDDLE: 'means over {} ms around their stamps',
                 WheelReading.WINDOW_START: 'means over {} ms after their stamps',
                 WheelReading.FILTERED: 'behind a first-order low pass of {} ms'}[reading.wheels]
-        notes.append('wheel rates seem to be ' + kind.format(f'{1e3 * window:.2g}'))
+        notes.append('wheel rates seem to be ' + kind.format(f'{1e3 * window:.0f}'))
     if reading.imu is not None and any(d.imu_times.size for d in drives):
-        length = f'{1e3 * reading.get("imu_window"):.2g} ms'
+        length = f'{1e3 * reading.get("imu_window"):.0f} ms'
         notes.append('yaw rates of the IMU seem to be ' + (
             f'behind a first-order low pass of {length}' if reading.imu == math.inf
             else f'means over {length}'))

@@ -5,11 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-import math
 
 from lg_husky_sim.diagnosis.before_after.settings import settings as before_after
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
-from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.wording import LATENESS, lateness_words, PHASE, sized, what_to_check
 from lg_husky_sim.husky.effects import catalogue, effect_kind, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
@@ -30,7 +28,6 @@ from lg_husky_sim.reporting.data import (
 from lg_husky_sim.reporting.sections import Cell, Section, Table, Tone
 from lg_husky_sim.reporting.words import (
     capitalised,
-    change,
     number,
     plural,
     with_interval,
@@ -151,32 +148,6 @@ def _facts(finding: Finding, several: bool, changed: bool) -> tuple[tuple[str, s
             ('Acts', _acts(finding, changed)))
 
 
-def losses(tables: Sequence[ErrorTable]) -> tuple[str, ...]:
-    """
-    Return a warning for the held-out errors that grow with what was found.
-
-    Parameters
-    ----------
-    tables : sequence of ErrorTable
-
-    Returns
-    -------
-    tuple of str
-        At most one, with all of them.
-    """
-    worse = []
-    for table in tables:
-        if not table.held_out or table.compared is None:
-            continue
-        for row in table.rows:
-            before, after = (row.values.get(name, math.nan) for name in table.compared)
-            if after > before * (1.0 + setting('worse')):
-                worse.append(f'{row.name.split(" [")[0]} {change(before, after)}')
-    return () if not worse else (
-        'On held-out data, the model with the finding predicts worse than the '
-        f'recalibrated one: {", ".join(worse)}. Use `plain.yaml` where these matter.',)
-
-
 def implausible(rows: Sequence[ParameterRow]) -> tuple[str, ...]:
     """Return a warning where parameters of the recalibration end at what it may use up."""
     bound = [one.name.replace('_', ' ') for one in rows if one.at_bound]
@@ -253,9 +224,10 @@ def _for_a_change(finding: Finding, values: Mapping[str, float | str]) -> tuple[
 
 def _which(diagnosis: Diagnosis) -> str:
     # What model.yaml is.
-    nameless = diagnosis.fits and all(f.effect == 'unknown' for f in diagnosis.findings)
-    if nameless or diagnosis.model == diagnosis.plain_model:
+    if diagnosis.model == diagnosis.plain_model:
         return 'recalibrated model'
+    if diagnosis.fits and all(f.effect == 'unknown' for f in diagnosis.findings):
+        return 'model with the nearest effects of the catalogue'
     return 'model with the finding' if diagnosis.fits else (
         'commercial base, a starting point for a model of this robot')
 
@@ -376,13 +348,14 @@ def report_data(
              if diagnosis.verdict is Verdict.KNOWN else
              'a commercial base: limited commands, wheel-speed loop, tyres that saturate'
              if not diagnosis.fits else
-             'refitted with a smooth description of what is missing'}
+             'refitted with the nearest effects of the catalogue, which do not explain it'}
     remains = diagnosis.remaining if diagnosis.fits else ''
     notes = (*(f'sensors compared with each other: {text}'
                for text in unexplained_sensors(diagnosis)),
              *diagnosis.notes,
              *((f'what remains: {remains}',) if remains else ()))
-    warnings = (*losses(errors), *(implausible(parameters) if diagnosis.fits else ()))
+    warnings = (*(f'{capitalised(text)}.' for text in diagnosis.warnings),
+                *(implausible(parameters) if diagnosis.fits else ()))
     return ReportData(
         f'{"What changed in " if changed else "Diagnosis of "}{", ".join(recordings)}',
         headline(diagnosis, warnings, changed=changed), columns,

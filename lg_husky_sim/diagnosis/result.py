@@ -10,8 +10,10 @@ import enum
 import math
 from typing import Any
 
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model_file import ModelFile
+from lg_husky_sim.reporting.words import quantity_with_unit
 
 SCHEMA = 'lg_husky_sim/diagnosis/1'
 #: Errors that stand in the JSON even where they cannot be told, as null.
@@ -183,6 +185,18 @@ class Diagnosis:
     sensors: tuple[str, ...] = ()
     fits: bool = True
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the model with the finding predicts worse on held-out data; one or none."""
+        before, after = self.held_out_plain, self.held_out_augmented
+        worse = [f'{quantity_with_unit(name)} from {value:.3g} to {after[name]:.3g}'
+                 for name, value in before.items()
+                 if name in after and after[name] > (1.0 + setting('worse')) * value]
+        model = 'the model with the finding' if self.fits else 'the commercial base'
+        return () if not worse or self.model == self.plain_model else (
+            f'on held-out data, {model} predicts worse than the recalibrated one: '
+            f'{", ".join(worse)}; use plain.yaml where these matter',)
+
 
 def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
@@ -221,7 +235,7 @@ def _finding_data(finding: Finding) -> dict[str, Any]:
         'onset': onset_data(finding.onset),
         'parameters': [_estimate_data(p) for p in finding.parameters],
         'evidence': {'held_out_gain_nats': _number(finding.held_out_gain),
-                     'p_value': _number(finding.p_value),
+                     'p_value': _number(max(finding.p_value, LEAST_CHANCE)),
                      'share_explained': _number(finding.share)},
         'rivals': [{'effect': r.effect, 'side': r.side,
                     'held_out_gain_nats': _number(r.held_out_gain)} for r in finding.rivals],
@@ -263,5 +277,6 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
         'remaining': diagnosis.remaining,
         'sensors': list(diagnosis.sensors),
         'model_fits_robot': diagnosis.fits,
+        'warnings': list(diagnosis.warnings),
         'notes': list(diagnosis.notes),
     }

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
-from lg_husky_sim.diagnosis.diagnose import _notes
+from lg_husky_sim.diagnosis.diagnose import _nearest, _notes, _refused
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -15,7 +16,10 @@ from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
+from lg_husky_sim.diagnosis.log_notes import reading_notes
+from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.search import Search
+from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.threads import Threads
@@ -37,6 +41,33 @@ def test_errors_of_rates_that_grow_behind_a_low_pass_are_explained(
         fit = evidence.fit(point, rounds=0)
     found = Search(fit, fit, evidence, (), (hypotheses(model.structure)[0],))
     notes = _notes(found, {grown: 0.1}, {grown: 0.2})
-    assert notes[0].startswith('held-out errors that grow with the finding: ')
-    assert notes[1].startswith('these are errors of the rates themselves') == said
+    assert notes[0].startswith('held-out errors of rates that grow are those of the rates') == said
     assert _notes(found, {grown: 0.1}, {grown: 0.1})[0].startswith('held-out') is False
+    name = found.found[0].effect.id
+    assert _nearest(found) == (f'model.yaml has the nearest effects of the catalogue, {name}, '
+                               'which do not explain it')
+    assert _nearest(replace(found, found=())) == ''
+    tried = (SimpleNamespace(hypothesis=found.found[0], gain=12.0),)
+    for chance, words in ((1.0, 'as chance alone gives it'),
+                          (0.25, 'which chance gives with a probability of 0.25'),
+                          (1e-9, 'more than chance gives, but too little')):
+        last = Round(evidence, fit, tried, False, chance)  # type: ignore[arg-type]
+        assert f'{name}, gains 12.0 nats, {words}' in _refused(last)
+
+
+def test_a_robot_that_is_not_driven_is_refused(drive: Callable[..., Recording]) -> None:
+    recording = drive('ahead', 'nothing', 1)
+    command = recording.streams['command']
+    still = replace(recording, streams={
+        **recording.streams, 'command': replace(command, values=0.0 * command.values)})
+    assert drives_of([still, recording])
+    with pytest.raises(RecordingError, match='all commands are zero; a robot that is not driven'):
+        drives_of([still])
+
+
+def test_windows_that_no_fit_has_moved_are_not_said(drive: Callable[..., Recording]) -> None:
+    drives = drives_of([drive('ahead', 'nothing', 1)])
+    assert reading_notes(drives, Reading()) == ()
+    wide = Reading(values={'wheel_window': 0.15})
+    assert reading_notes(drives, wide) == (
+        'wheel rates seem to be means over 150 ms before their stamps',)

@@ -8,18 +8,22 @@ from dataclasses import replace
 import math
 
 from lg_husky_sim.diagnosis.before_after.settings import Change, settings
-from lg_husky_sim.diagnosis.report import advice, competing, headline, implausible, losses
-from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Rivalry, Verdict
+from lg_husky_sim.diagnosis.output import summary_text
+from lg_husky_sim.diagnosis.report import advice, competing, headline, implausible, report_data
+from lg_husky_sim.diagnosis.result import (
+    Diagnosis,
+    diagnosis_data,
+    Estimate,
+    Finding,
+    Rivalry,
+    Verdict,
+)
 from lg_husky_sim.diagnosis.wording import sentence, sized
 from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.reporting.advice import names_in
 from lg_husky_sim.reporting.data import (
-    ErrorRow,
-    ErrorTable,
     ParameterRow,
-    RECALIBRATED,
-    WITH_FINDING,
 )
 from lg_husky_sim.reporting.sections import Cell, Tone
 import pytest
@@ -194,14 +198,19 @@ def test_the_runner_up_is_said_as_near_as_its_bar_is_long(gain: float, words: st
     assert all(words in line for line in runner_up)
 
 
-def test_what_gets_worse_on_held_out_data_is_said_first() -> None:
-    rows = (ErrorRow('position [m]', {RECALIBRATED: 0.05, WITH_FINDING: 0.1}),
-            ErrorRow('yaw rate [rad/s]', {RECALIBRATED: 0.2, WITH_FINDING: 0.1}))
-    columns = (RECALIBRATED, WITH_FINDING)
-    (warning,) = losses([ErrorTable('held out', rows, columns, True, columns)])
-    assert 'position +100\u00a0%' in warning
+def test_what_gets_worse_on_held_out_data_is_said_first_everywhere() -> None:
+    said = _diagnosis(Verdict.KNOWN, RIPPLE)
+    model = replace(said.model, about='with the finding')
+    worse = replace(said, model=model, held_out_plain={'max_abs_y_m': 0.05, 'yaw_rate_rmse': 0.2},
+                    held_out_augmented={'max_abs_y_m': 0.1, 'yaw_rate_rmse': 0.1})
+    (warning,) = worse.warnings
+    assert 'largest |Y| error [m] from 0.05 to 0.1;' in warning
     assert 'yaw rate' not in warning
-    assert losses([ErrorTable('all', rows, columns, False, columns)]) == ()
+    assert summary_text(worse).splitlines()[1] == f'  warning: {warning}'
+    assert diagnosis_data(worse)['warnings'] == [warning]
+    page = report_data(worse, ['rec'], [], [])
+    assert page.headline.warnings == (f'O{warning[1:]}.',)
+    assert replace(worse, held_out_augmented=worse.held_out_plain).warnings == ()
 
 
 def test_parameters_at_their_bounds_are_called_implausible() -> None:
