@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import math
 
 from lg_husky_sim.diagnosis.decision.confidence import confidence, Features
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.products import normal_matrix
@@ -73,8 +74,7 @@ def _is_undetermined(unknown: Unknown, place: float, half: float) -> bool:
 
 def _intervals(fit: Fit) -> list[tuple[Unknown, float, float]]:
     # Each number of the robot or an effect with its place and half of its 95 % interval there.
-    nu = setting('student')
-    weight = (nu + 1.0) / (nu + fit.whitened ** 2)
+    weight = student.weights(fit.whitened)
     normal = normal_matrix(fit.jacobian, weight) + np.diag(fit.point.weights ** 2)
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
     covariance = np.linalg.pinv(normal / np.outer(scale, scale)) / np.outer(scale, scale)

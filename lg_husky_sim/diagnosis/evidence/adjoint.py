@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from lg_husky_sim.diagnosis.evidence.noise import Whitener
 from lg_husky_sim.diagnosis.evidence.observation import probe_times
-from lg_husky_sim.diagnosis.evidence.whitener import Integers
+from lg_husky_sim.diagnosis.evidence.whitener import Integers, state_of
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
@@ -77,16 +77,7 @@ def _scores(weights: FloatArray, grid: FloatArray, times: FloatArray, channels: 
             back[5] += seen
             back[6] += seen
         else:
-            state = 7
-            if channel == 3:
-                state = 8
-            elif channel == 4:
-                state = 9
-            elif channel == 6:
-                state = 10
-            elif channel == 7:
-                state = 11
-            back[state] += seen
+            back[state_of(channel)] += seen
         before = times[order[k - 1]] if k > 0 else now
         # The last of the steps forwards, which begin at sums of the longest one, is the short one.
         count, left = 0, now - before

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import functools
 import operator
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.command_steps import rated, scaled, Steps, steps_of
 from lg_husky_sim.diagnosis.evidence.drives import Clock, Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
@@ -142,8 +143,7 @@ class Ticker:
             log = log.replacing({'command_delay': log.get('command_delay') + clock.late})
         left = scaled(rated(held, held.measured - observe(
             simulate(self.plant, held, log), held, log)), self.steps.scales)
-        nu = setting('student')
-        return 0.5 * (nu + 1.0) * float(np.sum(np.log1p(left ** 2 / nu)))
+        return student.cost(left)
 
 
 def _same_rate(known: Mapping[str, Sequence[Ticker]], periods: FloatArray,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
@@ -35,8 +36,7 @@ def dispersion(evidence: Evidence, whitened: FloatArray, columns: FloatArray) ->
     float
         At least what Student's t makes of white innovations.
     """
-    nu = setting('student')
-    scores = whitened * (nu + 1.0) / (nu + whitened ** 2)
+    scores = whitened * student.weights(whitened)
     sums = np.array([scores[part] @ columns[part] for part in _blocks(evidence, setting('block'))])
     meat = sums.T @ sums
     scale = np.sqrt(np.maximum(np.einsum('ij,ij->j', columns, columns), 1e-300))
@@ -61,8 +61,7 @@ def accident(evidence: Evidence, before: FloatArray, after: FloatArray) -> float
     float
         [nats]
     """
-    nu = setting('student')
-    gains = 0.5 * (nu + 1.0) * (np.log1p(before ** 2 / nu) - np.log1p(after ** 2 / nu))
+    gains = student.costs(before) - student.costs(after)
     return max(0.0, *(float(np.sum(gains[part])) for part in _blocks(
         evidence, setting('accident'))))
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.diagnosis.evidence.deviation import slow_model
 from lg_husky_sim.diagnosis.evidence.differences import Differences
@@ -122,9 +123,7 @@ class Evidence:
 
     def cost(self, whitened: FloatArray, point: Point) -> float:
         """Return the negative log posterior of a point, up to a constant [nats]."""
-        nu = setting('student')
-        return float(np.sum(0.5 * (nu + 1.0) * np.log1p(whitened * whitened / nu))
-                     + 0.5 * np.sum(point.prior_residuals ** 2))
+        return student.cost(whitened) + 0.5 * float(np.sum(point.prior_residuals ** 2))
 
     def surprise(self, fit: Fit) -> float:
         """Return the cost of a fit under this noise, comparable under any noise [nats]."""
@@ -181,14 +180,14 @@ class Evidence:
         raw = [np.zeros((d.measured.size, len(point.unknowns))) for d in self.drives] if (
             slopes is None) else [np.array(one) for one in slopes]
         fresh = slopes is not None and renew is None
-        damping, nu = 1e-6, setting('student')
+        damping = 1e-6
         rows = self.whiten(raw) / inflation if fresh else np.zeros((0, 0))
         for _ in range(rounds):
             if not fresh:
                 for old, new in zip(raw, self.derivatives(point, predicted, which), strict=True):
                     old[:, which] = new
                 rows = self.whiten(raw) / inflation
-            weight = (nu + 1.0) / (nu + whitened * whitened)
+            weight = student.weights(whitened)
             normal = normal_matrix(rows, weight) + np.diag(point.weights ** 2)
             slope = rows.T @ (weight * whitened) - point.weights * point.prior_residuals
             scale = np.diag(normal) + 1e-12

@@ -16,6 +16,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 import math
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.frames import Frame
 from lg_husky_sim.diagnosis.evidence.whitener import (
@@ -184,9 +185,7 @@ def negative_log_likelihood(whitened: FloatArray, scale: FloatArray) -> float:
     ----------
     whitened, scale : numpy.ndarray, shape (n,)
     """
-    nu = setting('student')
-    return float(np.sum(0.5 * (nu + 1.0) * np.log1p(whitened * whitened / nu))
-                 + np.sum(np.log(scale)))
+    return student.cost(whitened) + float(np.sum(np.log(scale)))
 
 
 def _first(name: str, robot: RobotSize) -> float:
@@ -270,14 +269,14 @@ def fit_noise(start: Noise, frames: Sequence[Frame], models: Sequence[FloatArray
     def weighed(e: FloatArray, moved: FloatArray, ds: FloatArray) -> tuple[FloatArray, FloatArray]:
         # Of innovations e/S^(1/2): information 2 (d ln s)^2 + (d (e s)/s)^2.
         fisher = 2.0 * ds.T @ ds + moved.T @ moved + np.diag(spread ** -2.0)
-        slope = (nu + 1.0) * e / (nu + e * e)
+        slope = e * student.weights(e)
         gradient = (slope @ moved + (1.0 - slope * e) @ ds + (place - centre) / spread ** 2)
         # A forward difference carries half of the curvature of its own step.
         return fisher, gradient - 0.5 * step * np.diag(fisher)
 
     place = np.clip(np.log([start.values[n] for n in NAMES]), lower, upper)
     cost, e, logs = run(place)
-    damping, nu, least = 1e-3, setting('student'), setting('noise_converged')
+    damping, least = 1e-3, setting('noise_converged')
     for _ in range(rounds):
         shifted = list(pool.map(run, [place + step * row for row in np.eye(place.size)]))
         ds = np.column_stack([(one[2] - logs) / step for one in shifted])

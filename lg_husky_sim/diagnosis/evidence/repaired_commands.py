@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.noise import Whitener
 from lg_husky_sim.diagnosis.settings import setting
@@ -49,7 +50,7 @@ def repaired(drive: Drive, whitener: Whitener, whitened: FloatArray, score: Scor
     for known in (Channel.Y, Channel.HEADING):
         wheel &= drive.channels[order] != int(known)
     e = whitened if drive is plain else score(plain)
-    best, cost = plain, _cost(e)
+    best, cost = plain, student.cost(e)
     tried: set[int] = set()
     for _ in range(most):
         far = wheel & (np.abs(e) > setting('far'))
@@ -61,19 +62,14 @@ def repaired(drive: Drive, whitener: Whitener, whitened: FloatArray, score: Scor
                 continue
             tried.add(place)
             for other, innovations in _others(best, float(stamps[place]), score):
-                if cost - _cost(innovations) > setting('missed_gain'):
-                    found, e, cost = other, innovations, _cost(innovations)
+                if cost - student.cost(innovations) > setting('missed_gain'):
+                    found, e, cost = other, innovations, student.cost(innovations)
             if found is not None:
                 break
         if found is None:
             break
         best = found
     return best
-
-
-def _cost(whitened: FloatArray) -> float:
-    nu = setting('student')
-    return float(np.sum(0.5 * (nu + 1.0) * np.log1p(whitened * whitened / nu)))
 
 
 def _suspects(times: FloatArray, sizes: FloatArray, stamps: FloatArray) -> list[int]:
@@ -116,7 +112,7 @@ def _held(drive: Drive, place: int, usual: float, score: Score) -> tuple[Drive, 
         other = replace(drive, commands=TimeSeries(
             times[last], commands.values[last], commands.names))
         e = score(other)
-        return _cost(e), gaps, other, e
+        return student.cost(e), gaps, other, e
     best = min((late(gaps) for gaps in (0.5, 1.5, 2.5)), key=lambda one: one[0])
     for step in (0.5, 0.25, 0.125):
         best = min((best, *(late(best[1] + side * step) for side in (-1.0, 1.0)

@@ -85,6 +85,18 @@ def _propagate(z: FloatArray, width: int, left: float, longest: float, cosine: f
 
 
 @jit_part
+def state_of(channel: int) -> int:
+    """Return the state that a channel beyond the rates reads."""
+    if channel == 3:
+        return 8
+    if channel == 4:
+        return 9
+    if channel == 6:
+        return 10
+    return 11 if channel == 7 else 7
+
+
+@jit_part
 def _read_all(z: FloatArray, width: int, channel: int, m: FloatArray, seen: FloatArray) -> None:
     # H z of one channel for all columns.
     if channel < 2:
@@ -96,15 +108,7 @@ def _read_all(z: FloatArray, width: int, channel: int, m: FloatArray, seen: Floa
         for j in range(width):
             seen[j] = z[5, j] + z[6, j]
     else:
-        state = 7
-        if channel == 3:
-            state = 8
-        elif channel == 4:
-            state = 9
-        elif channel == 6:
-            state = 10
-        elif channel == 7:
-            state = 11
+        state = state_of(channel)
         for j in range(width):
             seen[j] = z[state, j]
 

@@ -15,6 +15,7 @@ without them, each less half the logarithm of the number of readings for its tim
 
 from __future__ import annotations
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.settings import setting
@@ -69,10 +70,10 @@ def _gains(times: FloatArray, e: FloatArray, sizes: FloatArray, drive: Drive, le
     far = np.flatnonzero(np.abs(e) > setting('far'))
     if not far.size:
         return []
-    nu, before = setting('student'), setting('burst_before')
+    before = setting('burst_before')
     stamps = drive.logged.times
     changes = np.abs(np.diff(drive.logged.values, axis=0, prepend=drive.logged.values[:1]))
-    costs = 0.5 * (nu + 1.0) * np.log1p(e * e / nu)
+    costs = student.costs(e)
     found = []
     for burst in np.split(far, np.flatnonzero(np.diff(times[far]) > setting('burst_apart')) + 1):
         begin, end = times[burst[0]] - before, times[burst[-1]]

@@ -15,6 +15,7 @@ from contextlib import suppress
 from dataclasses import replace
 import math
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.products import normal_matrix
@@ -91,11 +92,9 @@ def _better(evidence: Evidence, fit: Fit, window: str,
 
 def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
     # What a fit would cost after one step from a point, with the derivatives of this one.
-    nu = setting('student')
-
     def promise(point: Point) -> float:
         e = evidence.residuals(evidence.predict(point))
-        weight = (nu + 1.0) / (nu + e * e)
+        weight = student.weights(e)
         normal = normal_matrix(fit.jacobian, weight) + np.diag(point.weights ** 2)
         slope = fit.jacobian.T @ (weight * e) - point.weights * point.prior_residuals
         # A number that acts nowhere, of an effect without a prior, may leave it singular.

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.products import normal_matrix, row_slices
 from lg_husky_sim.diagnosis.evidence.unknowns import NEUTRAL
@@ -70,9 +71,8 @@ class Projection:
     """
 
     def __init__(self, fit: Fit) -> None:
-        nu = setting('student')
         count = fit.whitened.size
-        root = np.sqrt((nu + 1.0) / (nu + fit.whitened ** 2))
+        root = np.sqrt(student.weights(fit.whitened))
         stacked = np.vstack([fit.jacobian * root[:, None], np.diag(fit.point.weights)])
         base, _ = np.linalg.qr(stacked)
         target = np.concatenate([root * fit.whitened, -fit.point.prior_residuals])
@@ -216,19 +216,15 @@ def settled(whitened: FloatArray, columns: FloatArray, start: FloatArray,
         [nats]
     numpy.ndarray, shape (m,)
     """
-    nu = setting('student')
     low, high = np.transpose(limits)
-
-    def cost(left: FloatArray) -> float:
-        return float(np.sum(0.5 * (nu + 1.0) * np.log1p(left * left / nu)))
-    before, gain, best = cost(whitened), 0.0, start
+    before, gain, best = student.cost(whitened), 0.0, start
     own = start
     for _ in range(int(setting('reweighted_looks'))):
         left = whitened - columns @ own
-        promised = before - cost(left)
+        promised = before - student.cost(left)
         if promised > gain:
             gain, best = promised, own
-        weight = (nu + 1.0) / (nu + left * left)
+        weight = student.weights(left)
         normal = normal_matrix(columns, weight)
         size = np.sqrt(np.maximum(np.diag(normal), 0.0))
         if not np.all(np.isfinite(size)) or np.any(size <= setting('rounding')):

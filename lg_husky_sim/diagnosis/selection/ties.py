@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
@@ -19,10 +20,7 @@ import numpy as np
 
 def gains_of(base: Fit, other: Fit) -> FloatArray:
     """Return what each reading is likelier under the other fit, shape (n,) [nats]."""
-    nu = setting('student')
-    before, after = (0.5 * (nu + 1.0) * np.log1p(f.whitened ** 2 / nu) for f in (base, other))
-    found: FloatArray = before - after
-    return found
+    return student.costs(base.whitened) - student.costs(other.whitened)
 
 
 def is_near(evidence: Evidence, best: Fit, other: Fit, difference: float, gain: float) -> bool:
