@@ -292,10 +292,15 @@ def test_results_show_themselves_in_notebooks(drive: Path) -> None:
 def test_drawing_needs_the_right_number_of_axes(drive: Path) -> None:
     recording = lg.read(drive)
     axes = Figure().subplots(1, 3)
-    with pytest.raises(RecordingError, match='3 axes given'):
+    with pytest.raises(ParameterError, match='3 axes given; a recording is drawn into 4'):
         recording.plot(axes)
-    with pytest.raises(CommandError, match='3 axes given'):
+    with pytest.raises(ParameterError, match='3 axes given; a comparison is drawn into 4'):
         lg.compare(recording).plot(axes)
+
+
+def test_a_square_of_axes_is_four_of_them(drive: Path) -> None:
+    square = Figure().subplots(2, 2)
+    assert list(lg.read(drive).plot(square)) == list(square.flat)
 
 
 def test_progress_is_told_to_a_function_and_kept_quiet_without_a_watcher(

@@ -14,12 +14,13 @@ import tempfile
 from typing import Any, TYPE_CHECKING, TypeAlias
 
 from lg_husky_sim import recording as rec
+from lg_husky_sim.api.axes import axes_or_new
 from lg_husky_sim.api.progress import Report, Shown, shown
-from lg_husky_sim.api.recordings import listed, PathLike, read_all, Recordings, Topics
+from lg_husky_sim.api.recordings import given, listed, PathLike, read_all, Recordings, Topics
 from lg_husky_sim.api.robots import as_husky, Husky
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.comparison.metrics import UNITS
-from lg_husky_sim.comparison.models import NamedPlant, plants_in, recordings_of, unique_labels
+from lg_husky_sim.comparison.models import labels_of, NamedPlant, plants_in, recordings_of
 from lg_husky_sim.comparison.outcome import (
     as_json,
     closest,
@@ -29,7 +30,6 @@ from lg_husky_sim.comparison.outcome import (
     text_table,
 )
 from lg_husky_sim.errors import CommandError
-from lg_husky_sim.extras import require
 from lg_husky_sim.folders import result_folder
 from lg_husky_sim.husky.model_file import default_model_path
 from lg_husky_sim.recording.names import printable
@@ -122,17 +122,11 @@ class Comparison:
         -------
         numpy.ndarray of matplotlib Axes, shape (4,)
         """
-        require('matplotlib', 'draw figures')
         from lg_husky_sim.comparison.traces import traces_of
         from lg_husky_sim.reporting.pictures import draw_path, draw_signal
         from lg_husky_sim.reporting.styles import column_styles
 
-        if axes is None:
-            from matplotlib import pyplot
-            _, grid = pyplot.subplots(2, 2, figsize=(10.0, 6.5), layout='constrained')
-            axes = list(grid.flat)
-        if len(axes) != 4:
-            raise CommandError(f'{len(axes)} axes given; a comparison is drawn into 4')
+        axes = axes_or_new(axes, (2, 2), 'a comparison', (10.0, 6.5))
         outcome = self.outcomes[recording]
         part = max(outcome.segments, key=lambda one: one.segment.duration)
         styles = column_styles(self.labels)
@@ -270,13 +264,13 @@ def compare(recordings: Recordings, models: Models = None, *, rivals: Recordings
     Raises
     ------
     CommandError
-        If the horizon is negative, or there is not one rival for each recording.
+        If the horizon is negative, there is no model, or not one rival for each recording.
     RecordingError
-        If a recording cannot be used.
+        If there is no recording, or one cannot be used.
     """
     if not 0.0 <= horizon < math.inf:
         raise CommandError(f'horizon = {horizon:g} s must be 0 or positive')
-    recordings, rivals = listed(recordings), listed(rivals)
+    recordings, rivals = given(recordings), listed(rivals)
     if rivals and len(rivals) != len(recordings):
         raise CommandError(f'{len(rivals)} rivals for {len(recordings)} recordings: give one '
                            'for each recording, in their order, or none')
@@ -301,17 +295,16 @@ def compare(recordings: Recordings, models: Models = None, *, rivals: Recordings
 
 def _named(models: Models, settings: Mapping[str, float]) -> tuple[NamedPlant, ...]:
     if isinstance(models, Mapping):
-        given = dict(models)
+        chosen = dict(models)
     else:
         several: Sequence[Model | None] = [models] if models is None or isinstance(
-            models, (str, os.PathLike, Husky)) else models
-        paths = [_path_of(model) for model in several]
-        given = dict(zip(unique_labels(paths), several, strict=True))  # type: ignore[arg-type]
-        if not settings:
-            given = {('paper' if path == default_model_path() else label): model for
-                     path, (label, model) in zip(paths, given.items(), strict=True)}
+            models, (str, os.PathLike, Husky)) else list(models)
+        names = labels_of([_path_of(model) for model in several], bool(settings))
+        chosen = dict(zip(names, several, strict=True))  # type: ignore[arg-type]
+    if not chosen:
+        raise CommandError('no model given')
     found = []
-    for label, model in given.items():
+    for label, model in chosen.items():
         husky = Husky(as_husky(model), **settings)
         found.append(NamedPlant(label, str(_path_of(model)), husky.model, husky.plant))
     return tuple(found)

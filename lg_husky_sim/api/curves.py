@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from lg_husky_sim.api.axes import axes_or_new
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.extras import require
@@ -25,20 +26,6 @@ BANDWIDTH = 3.0
 """Loss of gain [dB] at the bandwidth."""
 LEAST_GAIN, LEAST_PHASE = 20.0, 90.0
 """Least ranges of gain [dB] and phase [deg] that a picture shows."""
-
-
-def _axes(axes: Any, count: int, what: str, height: float, share: bool = False) -> list[Any]:
-    """Return the axes to draw into, of a new figure if there are none."""
-    require('matplotlib', 'draw figures')
-    if axes is None:
-        from matplotlib import pyplot
-        _, grid = pyplot.subplots(count, 1, figsize=(7.0, 1.0 + height * count), squeeze=False,
-                                  sharex=share, layout='constrained')
-        return list(grid.flat)
-    found = list(np.ravel(np.asarray(axes, dtype=object)))
-    if len(found) != count:
-        raise ParameterError(f'{len(found)} axes given; {what} is drawn into {count}')
-    return found
 
 
 def _lines(*texts: str) -> str:
@@ -178,8 +165,9 @@ class StepResponse:
         ParameterError
             If there are not as many axes as outputs.
         """
-        found = _axes(axes, len(self.names), f'a step response of {len(self.names)} outputs',
-                      2.0, share=True)
+        count = len(self.names)
+        found = axes_or_new(axes, (count, 1), f'a step response of {count} outputs',
+                            (7.0, 1.0 + 2.0 * count), share=True)
         for axis, name, unit, final in zip(found, self.names, self.units, self.final, strict=True):
             line, = axis.plot(self.times, self.column(name), label=label or None)
             if not np.isnan(final):
@@ -275,7 +263,7 @@ class FrequencyResponse:
         ParameterError
             If there are not two axes.
         """
-        found = _axes(axes, 2, 'a frequency response', 2.2, share=True)
+        found = axes_or_new(axes, (2, 1), 'a frequency response', (7.0, 5.4), share=True)
         from matplotlib.ticker import MultipleLocator
         gain = f'gain [dB of {self.unit}]' if self.unit else 'gain [dB]'
         for axis, curve, name in zip(found, self, (gain, 'phase [deg]'),

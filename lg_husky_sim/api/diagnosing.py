@@ -13,7 +13,16 @@ from typing import Any, TYPE_CHECKING
 import warnings
 
 from lg_husky_sim.api.progress import Shown, shown
-from lg_husky_sim.api.recordings import listed, PathLike, read_all, Recording, Recordings, Topics
+from lg_husky_sim.api.recordings import (
+    check_count,
+    given,
+    listed,
+    PathLike,
+    read_all,
+    Recording,
+    Recordings,
+    Topics,
+)
 from lg_husky_sim.api.robots import Husky
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.folders import result_folder
@@ -190,11 +199,12 @@ def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),
     from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case
     from lg_husky_sim.diagnosis.diagnose import diagnose as run
 
-    recordings, baseline = listed(recordings), listed(baseline)
+    recordings, baseline = given(recordings), listed(baseline)
+    jobs = (os.cpu_count() or 1) if jobs is None else jobs
+    check_count('jobs', jobs)
     with shown(progress) as report:
         after = read_all(recordings, topics=topics, progress=lambda stage, _: report(stage, 0.0))
         before = read_all(baseline, topics=topics, progress=lambda stage, _: report(stage, 0.0))
-        jobs = jobs or os.cpu_count() or 1
         case = change_case(after, before, husky.model, report, jobs=jobs) if before else run(
             after, husky.model, report, jobs=jobs)
     return DiagnosisResult(case, tuple(after), husky, tuple(before))

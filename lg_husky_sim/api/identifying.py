@@ -13,7 +13,7 @@ from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim import recording as rec
 from lg_husky_sim.api.progress import Shown, shown
-from lg_husky_sim.api.recordings import PathLike, read_all, Recordings, Topics
+from lg_husky_sim.api.recordings import check_count, given, PathLike, read_all, Recordings, Topics
 from lg_husky_sim.api.robots import Husky
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.comparison.replay import replay
@@ -178,6 +178,9 @@ def identify(husky: Husky, recordings: Recordings, free: Iterable[str] = (), *,
     methods = [one.value for one in Method]
     if method not in methods:
         raise FitError(f'method {method!r} is unknown; there are {", ".join(methods)}')
+    check_count('starts', starts)
+    check_count('jobs', jobs)
+    recordings = given(recordings)
     model = with_effects(husky.model, tuple(effects))
     onset = model.structure.onset
     with shown(progress, known=False) as report:

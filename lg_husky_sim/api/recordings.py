@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING, TypeAlias
 
 from lg_husky_sim import recording as rec
+from lg_husky_sim.api.axes import axes_or_new
 from lg_husky_sim.api.progress import Report
 from lg_husky_sim.api.tables import page_part, Table
-from lg_husky_sim.errors import RecordingError
+from lg_husky_sim.errors import CommandError, RecordingError
 from lg_husky_sim.extras import require
 from lg_husky_sim.recording.bags import bags_in
 from lg_husky_sim.signals import TimeSeries
@@ -140,13 +141,7 @@ class Recording(rec.Recording):
         -------
         numpy.ndarray of matplotlib Axes, shape (4,)
         """
-        require('matplotlib', 'draw figures')
-        if axes is None:
-            from matplotlib import pyplot
-            _, grid = pyplot.subplots(2, 2, figsize=(10.0, 6.0), layout='constrained')
-            axes = list(grid.flat)
-        if len(axes) != 4:
-            raise RecordingError(f'{len(axes)} axes given; a recording is drawn into 4')
+        axes = axes_or_new(axes, (2, 2), 'a recording', (10.0, 6.0))
         prefix = f'{label} ' if label else ''
         path, speed, wheels, turn = axes
         if 'pose' in self.streams:
@@ -306,16 +301,44 @@ def read_all(source: Recordings, *, topics: Topics = None, progress: Report | No
         If one of them is no usable bag.
     """
     chosen = topic_map(topics)
-    given = listed(source)
+    several = listed(source)
     found = []
-    for number, one in enumerate(given):
+    for number, one in enumerate(several):
         if isinstance(one, rec.Recording):
             found.append(Recording.of(one))
             continue
         if progress is not None:
-            progress(f'reading {one.name}', number / len(given))
+            progress(f'reading {one.name}', number / len(several))
         found.append(Recording.of(rec.read_recording(one, chosen)))
     return found
+
+
+def given(source: Recordings) -> list[Path | rec.Recording]:
+    """
+    Return what is to be read as :func:`listed` does, which must be something.
+
+    Raises
+    ------
+    RecordingError
+        If there is none, or a path does not exist.
+    """
+    found = listed(source)
+    if not found:
+        raise RecordingError('no recording given')
+    return found
+
+
+def check_count(name: str, value: int) -> None:
+    """
+    Check how many processes, threads or starts are asked for.
+
+    Raises
+    ------
+    CommandError
+        If fewer than one.
+    """
+    if value < 1:
+        raise CommandError(f'{name} = {value}: at least 1 is needed')
 
 
 def listed(source: Recordings) -> list[Path | rec.Recording]:
@@ -329,12 +352,12 @@ def listed(source: Recordings) -> list[Path | rec.Recording]:
     """
     several: Iterable[PathLike | rec.Recording] = [source] if isinstance(
         source, (str, os.PathLike, rec.Recording)) else source
-    given: list[Path | rec.Recording] = []
+    found: list[Path | rec.Recording] = []
     for one in several:
         if isinstance(one, rec.Recording):
-            given.append(one)
+            found.append(one)
             continue
         if not Path(one).exists():
             raise RecordingError(f'no recording {one}: there is no such file or folder')
-        given += bags_in(Path(one))
-    return given
+        found += bags_in(Path(one))
+    return found

@@ -228,7 +228,9 @@ class Husky(Graph):
         FitError
             If nothing is free, or a name is unknown.
         RecordingError
-            If a recording cannot be used.
+            If there is no recording, or one cannot be used.
+        CommandError
+            If starts or jobs are fewer than one.
         """
         from lg_husky_sim.api.identifying import identify
         return identify(self, recordings, free, effects=effects, method=method,
@@ -260,7 +262,9 @@ class Husky(Graph):
         Raises
         ------
         RecordingError
-            If a recording cannot be used.
+            If there is no recording, or one cannot be used.
+        CommandError
+            If jobs are fewer than one.
         DiagnosisError
             If the recordings cannot be those of a Husky.
         """

@@ -61,12 +61,19 @@ def load_plants(
         If a setting is unknown or out of bounds.
     """
     places = tuple(paths) or (default_model_path(),)
-    labels = unique_labels(places)
-    if not settings and default_model_path() in places:
-        labels = tuple('paper' if place == default_model_path() else label
-                       for label, place in zip(labels, places, strict=True))
     return tuple(_named(label, place, settings or {})
-                 for label, place in zip(labels, places, strict=True))
+                 for label, place in zip(labels_of(places, bool(settings)), places, strict=True))
+
+
+def labels_of(paths: Sequence[Path], changed: bool) -> tuple[str, ...]:
+    """
+    Return a short name for each model file, all different.
+
+    The packaged Husky is called paper unless settings have changed it.
+    """
+    packaged = default_model_path()
+    return unique_labels([Path('paper') if path == packaged and not changed else path
+                          for path in paths])
 
 
 def plants_in(
@@ -107,16 +114,21 @@ def unique_labels(paths: Sequence[Path]) -> tuple[str, ...]:
     """
     Return a short name for each path, all different.
 
-    The file's name without ending; with its folder where two are the same, and numbered where
-    that does not help either.
+    The file's name without ending; with its folder where two are the same in different ones, and
+    numbered where that does not help either. What has no file, such as ``paper``, has no folder.
     """
-    stems = [path.stem for path in paths]
-    labels = [
-        f'{path.resolve().parent.name}/{stem}' if stems.count(stem) > 1 else stem
-        for path, stem in zip(paths, stems, strict=True)]
+    folders: dict[str, set[str]] = {}
+    for path in paths:
+        folders.setdefault(path.stem, set()).add(_folder(path))
+    labels = [_folder(path) * (len(folders[path.stem]) > 1) + path.stem for path in paths]
     return tuple(
         label if labels.count(label) == 1 else f'{label} {labels[:place].count(label) + 1}'
         for place, label in enumerate(labels))
+
+
+def _folder(path: Path) -> str:
+    unfiled = path.parent == Path() and not path.suffix and not path.exists()
+    return '' if unfiled else f'{path.resolve().parent.name}/'
 
 
 def _named(label: str, path: Path, settings: Mapping[str, float]) -> NamedPlant:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import lg_husky_sim as lg
 from lg_husky_sim.comparison import channel_errors, initial_state, replay, tracking
 from lg_husky_sim.comparison.models import load_plants, NamedPlant, plants_in, unique_labels
 from lg_husky_sim.comparison.output import simulate_recording
@@ -157,6 +158,17 @@ def test_settings_and_labels(paper: NamedPlant) -> None:
 def test_labels_are_short_and_differ() -> None:
     paths = [Path('a/fit.yaml'), Path('b/fit.yaml'), Path('b/fit.yaml'), Path('other.yaml')]
     assert unique_labels(paths) == ('a/fit', 'b/fit 1', 'b/fit 2', 'other')
+    assert unique_labels([Path('b/fit.yaml')] * 2) == ('fit 1', 'fit 2')
+
+
+def test_a_name_without_a_file_has_no_folder(paper: NamedPlant) -> None:
+    assert unique_labels([Path('paper')] * 2) == ('paper 1', 'paper 2')
+    assert unique_labels([Path('paper'), Path('x/paper.yaml')]) == ('paper', 'x/paper')
+
+
+def test_two_of_the_packaged_models_are_two(paper: NamedPlant) -> None:
+    drive = lg.Husky().simulate('spin')
+    assert lg.compare(drive, [lg.Husky(), lg.Husky()]).labels == ('paper 1', 'paper 2')
 
 
 def test_an_onset_belongs_to_its_recording(paper: NamedPlant) -> None:
