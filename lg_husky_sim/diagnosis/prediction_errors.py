@@ -138,7 +138,8 @@ class Assessment:
         parts = (('On the robot', [line for error in self.errors for line in error.robot]),
                  ('In the simulator', [line for error in self.errors for line in error.simulator]))
         return (found, *(Advice(f'{name}{behind}', tuple(dict.fromkeys(lines)))
-                         for name, lines in parts if lines))
+                         for name, lines in parts if lines),
+                Advice(f'The cause{behind}', (remarks['cause'],)))
 
     def data(self) -> dict[str, object]:
         """Return it as plain data for JSON."""
@@ -198,11 +199,12 @@ def assess(parts: Predicted, label: str, parameters: Parameters) -> Assessment:
                                            math.nan), name) for name in poor]
     sound = {name: fit for name, fit in everything.items() if name not in poor}
     # A limit shifts edges: what it cuts off has no delay of its own.
-    found += [*_delays({name: fit for name, fit in sound.items() if not (
-        isinstance(fit, ChannelFit) and _is_limited(fit))}), *_gains(
+    delays = list(_delays({name: fit for name, fit in sound.items() if not (
+        isinstance(fit, ChannelFit) and _is_limited(fit))}))
+    gains = list(_gains(
         {name: fit for name, fit in fits.items() if name not in poor},
-        wheels if 'wheel_speed' in sound else None, parameters,
-        other_radius=bool(others))]
+        wheels if 'wheel_speed' in sound else None, parameters, other_radius=bool(others)))
+    found += [*delays, *(_settled_first(gains) if delays else gains)]
     return Assessment(label, tuple(found), compared=bool(everything))
 
 
@@ -229,12 +231,19 @@ def _delays(sound: Mapping[str, ChannelFit | WheelFit]) -> Iterator[PredictionEr
         else:
             yield _error('early', Number(-middle.value, -middle.high, -middle.low))
         return
+    unlike = _table()['remarks']['unlike'] if len(off) == 1 else ''
     for name, value in off.items():
         if value.value > 0.0:
-            yield _error('channel_delay', value, name, how='later')
+            yield _error('channel_delay', value, name, how='later', unlike=unlike)
         else:
             yield _error('channel_delay', Number(-value.value, -value.high, -value.low), name,
-                         how='earlier')
+                         how='earlier', unlike=unlike)
+
+
+def _settled_first(gains: Sequence[PredictionError]) -> list[PredictionError]:
+    # What a gain would be calibrated to is not said where dynamics may be behind it.
+    return [replace(error, robot=(_table()['remarks']['dynamic'],), simulator=())
+            for error in gains]
 
 
 def _off(gain: Number) -> bool:

@@ -216,13 +216,15 @@ class Base:
         """Return the likeliest clocks by recordings at each rate that stands out, best first."""
         rates = self._apart(_promising([one.steps for one in self.tickers]))
         found = _best(self.pool.map(self._tried, rates), 'clock_rates')
-        for drift, part, kept in ((0.3, 0.2, 'clock_rivals'), (0.15, 0.1, 'clock_rivals'),
-                                  (0.05, 0.033, 'clock_rivals')):
-            found = _best((self.sharpened(clocks, drift, part) for _, clocks in found), kept)
+        drift, part = setting('clock_drift'), setting('clock_shift')
+        # As near as the one before tried them.
+        for finer in (1.0, 3.0, 9.0):
+            found = _best((self.sharpened(clocks, drift / finer, part / finer)
+                           for _, clocks in found), 'clock_rivals')
         return [clocks for gain, clocks in found if gain > 0.0]
 
     def _tried(self, rate: float) -> tuple[float, dict[str, Clock]]:
-        drift = 0.3 * np.linspace(-1.0, 1.0, 5) / self.longest
+        drift = setting('clock_drift') * np.linspace(-1.0, 1.0, 5) / self.longest
         clocks = _same_rate(self.recordings, (1.0 + drift / rate) / rate,
                             int(setting('clock_phases')))
         return self.gain(clocks), clocks

@@ -115,7 +115,8 @@ def fault_findings(found: Sequence[Fault], fit: Fit | None = None) -> tuple[Find
         statement = f'{fault.statement}.'
         if fit is not None:
             numbers = estimates(fit, [fault.number.name], fit.point.numbers)
-            statement += f' The fit of the model gives {in_words(numbers)}.'
+            statement += (' The fit of all streams at once, which this answer takes, gives '
+                          f'{in_words(numbers)}.')
         kind = fault.effect.kind
         made.append(Finding(
             fault.effect.id, fault.effect.side, kind.subsystem.value,
