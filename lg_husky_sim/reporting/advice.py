@@ -5,15 +5,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+import math
 import string
 
-from lg_husky_sim.reporting.words import number
+from lg_husky_sim.reporting.words import digits_apart, number
 
 
 class _Number(float):
-    # A number that is written with three digits where its format says nothing.
+    # A number that is written with a few digits where its format says nothing.
+    digits = 3
+
     def __format__(self, spec: str) -> str:
-        return float.__format__(self, spec).replace('-', '−') if spec else number(self)
+        return float.__format__(self, spec).replace('-', '−') if spec else number(
+            self, self.digits)
+
+
+def _exact(value: float, low: float, high: float) -> dict[str, _Number]:
+    # A value with the ends of its interval, in digits that tell the three apart.
+    found = {'value': _Number(value), 'low': _Number(low), 'high': _Number(high)}
+    if math.isfinite(low) and math.isfinite(high):
+        for one in found.values():
+            one.digits = digits_apart(value, low, high)
+    return found
 
 
 def filled(sentences: Iterable[str], values: Mapping[str, float | str]) -> tuple[str, ...]:
@@ -25,7 +38,8 @@ def filled(sentences: Iterable[str], values: Mapping[str, float | str]) -> tuple
     sentences : iterable of str
         Such as ``Set `max_yaw: {limit_yaw}` in sim_node``.
     values : mapping of str to float or str
-        Numbers and words by name.
+        Numbers and words by name; ``value``, ``low`` and ``high`` are an estimate with its
+        interval.
 
     Returns
     -------
@@ -34,6 +48,9 @@ def filled(sentences: Iterable[str], values: Mapping[str, float | str]) -> tuple
     """
     known = {name: _Number(value) if isinstance(value, float) else value
              for name, value in values.items()}
+    estimate = [known.get(name) for name in ('value', 'low', 'high')]
+    if all(isinstance(one, float) for one in estimate):
+        known |= _exact(*estimate)  # type: ignore[arg-type]
     return tuple(sentence.format_map(known) for sentence in sentences
                  if names_in(sentence) <= set(known))
 

@@ -115,11 +115,16 @@ def with_interval(value: float, low: float, high: float, unit: str = '', word: s
     """
     if not (math.isfinite(low) and math.isfinite(high)):
         return ' '.join(filter(None, (with_unit(value, unit), word)))
-    digits = next((digits for digits in range(3, sys.float_info.dig) if all(
-        end == value or number(end, digits) != number(value, digits) for end in (low, high))),
-        sys.float_info.dig)
+    digits = digits_apart(value, low, high)
     said = ' '.join(filter(None, (with_unit(value, unit, digits), word)))
     return f'{said} ({number(low, digits)} to {number(high, digits)})'
+
+
+def digits_apart(value: float, low: float, high: float) -> int:
+    """Return three significant digits, or so many that a value differs from its bounds."""
+    return next((digits for digits in range(3, sys.float_info.dig) if all(
+        end == value or number(end, digits) != number(value, digits) for end in (low, high))),
+        sys.float_info.dig)
 
 
 def change(before: float, after: float, decimals: int = 0) -> str:

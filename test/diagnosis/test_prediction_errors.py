@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 import json
 from pathlib import Path
+import re
 
 from click.testing import CliRunner
 import lg_husky_sim as lg
@@ -92,6 +93,50 @@ def test_a_dead_time_is_measured_whoever_has_it(model_has: float, robot_has: flo
     assert (one.unit, one.quantity) == ('s', '')
 
 
+def test_a_payload_is_among_what_may_delay_a_speed() -> None:
+    found = assessed([NOMINAL.with_effect('payload', payload_mass=20.0).simulate('s_bend')])
+    one = only(found)
+    assert (one.kind, one.quantity) == ('channel_delay', 'forward')
+    assert one.statement.endswith(', unlike the other channels.')
+    first = one.robot[0]
+    for cause in ('mass', 'payload', 'limit of the acceleration', 'friction'):
+        assert cause in first
+    assert 'stamps' in one.robot[1]     # and only then the sensor
+
+
+def test_two_late_channels_are_not_unlike_the_others() -> None:
+    robot = NOMINAL.with_effect('command_slew', shape='forward', slew_forward=0.5)
+    found = assessed([robot.simulate('s_bend'), robot.simulate('stop_and_go')])
+    assert [(one.kind, one.quantity) for one in found.errors] == [
+        ('channel_delay', 'forward'), ('channel_delay', 'wheel_speed')]
+    assert not any('unlike' in one.statement for one in found.errors)
+
+
+def test_what_a_limit_of_the_acceleration_makes_is_not_calibrated_away() -> None:
+    robot = lg.Husky(turn_ratio=0.6).with_effect(
+        'command_slew', shape='forward', slew_forward=0.5)
+    found = assessed([robot.simulate('s_bend')])
+    assert [one.kind for one in found.errors] == ['channel_delay', 'turn_gain']
+    said = ' '.join(line for one in found.advice() for line in one.sentences)
+    assert 'limit of the acceleration' in said
+    assert 'find the cause of the delay before anything is calibrated' in said
+    for setting in ('wheel_separation', '--set', 'lg_husky identify'):
+        assert setting not in said
+
+
+def test_the_diagnosis_is_named_for_the_cause_of_every_difference() -> None:
+    for robot in (lg.Husky(turn_ratio=0.6), NOMINAL.with_effect('payload', payload_mass=20.0)):
+        last = assessed([robot.simulate('s_bend')]).advice()[-1]
+        assert last.where == 'The cause'
+        assert '`lg_husky diagnose REC --out DIR`' in last.sentences[0]
+
+
+def test_an_interval_has_digits_enough_to_be_one() -> None:
+    one = only(assessed([NOMINAL.with_effect('payload', payload_mass=20.0).simulate('s_bend')]))
+    value, low, high = re.findall(r'0\.\d+', one.statement)
+    assert float(low) < float(value) < float(high)
+
+
 def test_a_limit_of_the_yaw_rate_is_no_wrong_gain() -> None:
     one = only(assessed(drives(NOMINAL.with_effect(
         'command_limit', shape='yaw', limit_yaw=0.4))))
@@ -166,7 +211,8 @@ def test_compare_says_it_in_text_json_and_page(tmp_path: Path) -> None:
     assert difference['kind'] == 'turn_gain'
     assert difference['low'] <= difference['value'] <= difference['high']
     headings = [one['where'] for one in said['advice']]
-    assert headings == ['What differs from paper', 'On the robot', 'In the simulator']
+    assert headings == ['What differs from paper', 'On the robot', 'In the simulator',
+                        'The cause']
     page = (tmp_path / 'out' / 'index.html').read_text(encoding='utf-8')
     assert '<h2>What to change</h2>' in page
     assert '<code>--set turn_ratio=0.6</code>' in page
