@@ -14,7 +14,13 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.identification.confidence import Confidence, confidence, undetermined
 from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
-from lg_husky_sim.identification.multistart import best_solution, Ends, is_autocorrelated, refine
+from lg_husky_sim.identification.multistart import (
+    best_solution,
+    Ends,
+    is_autocorrelated,
+    judged,
+    refine,
+)
 from lg_husky_sim.identification.paper_objective import PaperObjective
 from lg_husky_sim.identification.problem import Observations, observations, UNITS
 from lg_husky_sim.identification.profile import Profile, profile
@@ -153,7 +159,8 @@ def _result(model: ModelFile, baseline: ModelFile, segments: Sequence[Segment], 
                 source=f'estimated from {", ".join(_recordings(segments))}')
         for one in of_model)), f'{model.about}; estimated by {method.value}'.lstrip('; '))
     values = np.array([one.value for one in estimates])
-    warnings = (*_warnings(solution, estimates, sure, ends, search, model),
+    warnings = (*_warnings(solution, estimates, search, model),
+                *_disagreement(problem, solution, ends),
                 *start_warnings(states), *_left_over(problem, solution))
     cost = solution.cost if search is None else search.cost
     converged = (solution.converged if search is None else search.converged)
@@ -228,9 +235,8 @@ def channel_fits(data: Observations, segments: Sequence[Segment], before: ModelF
     return tuple(rows)
 
 
-def _warnings(solution: Solution, estimates: Sequence[Estimated], sure: Confidence,
-              ends: Ends | None, search: SearchResult | None, model: ModelFile
-              ) -> tuple[str, ...]:
+def _warnings(solution: Solution, estimates: Sequence[Estimated],
+              search: SearchResult | None, model: ModelFile) -> tuple[str, ...]:
     said = []
     bounds = {u.name: (u.lower, u.upper) for u in solution.unknowns}
     if search is not None:
@@ -251,8 +257,6 @@ def _warnings(solution: Solution, estimates: Sequence[Estimated], sure: Confiden
         return tuple(said)
     if not solution.converged:
         said.append('not converged: the last step still lowered the cost')
-    if ends is not None and len(ends.all) > 1:
-        said.extend(_disagreement(ends, sure))
     return tuple(said)
 
 
@@ -265,14 +269,20 @@ def _left_over(problem: Problem, solution: Solution) -> list[str]:
             'out what is missing'] if names else []
 
 
-def _disagreement(ends: Ends, sure: Confidence) -> list[str]:
+def _disagreement(problem: Problem, solution: Solution, ends: Ends | None) -> list[str]:
+    # What the search itself saw, as far as noise that is believed can tell it, too.
+    if ends is None or len(ends.all) < 2:
+        return []
     said = []
-    best = min(end.cost for end in ends.all)
-    worse = [end for end in ends.all if end.cost > best + setting('equal_fit')]
-    equal = [end for end in ends.all if end.cost <= best + setting('equal_fit')]
-    spread = np.maximum(sure.deviations, 1e-12)
+    judge, costs = judged(problem, ends)
+    sure = confidence(judge, solution)
+    searched = np.array([end.cost for end in ends.all])
+    apart_by = setting('equal_fit')
+    told = (searched > searched.min() + apart_by) & (costs > costs.min() + apart_by)
+    worse = [end for end, one in zip(ends.all, told, strict=True) if one]
+    equal = [end for end, one in zip(ends.all, told, strict=True) if not one]
     apart: set[str] = set()
-    for unknown, deviation in zip(sure.unknowns, spread, strict=True):
+    for unknown, deviation in zip(sure.unknowns, sure.deviations, strict=True):
         varied = [unknown.varied(end.values[unknown.name]) for end in equal]
         if max(varied) - min(varied) > setting('starts_apart') * deviation:
             apart.add(unknown.name)

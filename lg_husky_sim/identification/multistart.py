@@ -11,7 +11,7 @@ from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.least_squares import Problem, Solution, solve, Unknown
-from lg_husky_sim.identification.noise import Metric, metric, scales
+from lg_husky_sim.identification.noise import believable, Metric, metric, scales
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.identification.settings import setting
 from lg_husky_sim.identification.unknowns import starts_of
@@ -144,6 +144,33 @@ def best_solution(data: Observations, model: ModelFile, unknowns: Sequence[Unkno
     if not any(np.isfinite(end.cost) for end in ends.all):
         raise FitError('the model cannot be simulated from any start')
     return ends
+
+
+def judged(problem: Problem, ends: Ends) -> tuple[Problem, FloatArray]:
+    """
+    Return the problem with noise that is believed, and what each end costs by it.
+
+    Parameters
+    ----------
+    problem : Problem
+        With the noise that a fit's residual shows.
+    ends : Ends
+
+    Returns
+    -------
+    problem : Problem
+    costs : numpy.ndarray, shape (n_ends,)
+        [nats]; infinite where the model cannot be evaluated.
+    """
+    data = problem.observations
+    judge = Problem(data, problem.model, problem.parameters, believable(data, problem.metric),
+                    problem.unknowns)
+    costs = []
+    for end in ends.all:
+        varied = judge.start(end.values)
+        predicted = judge.predict(varied)
+        costs.append(np.inf if predicted is None else judge.cost(predicted, varied)[0])
+    return judge, np.array(costs)
 
 
 def noise_metric(data: Observations, residual: FloatArray, predicted: FloatArray) -> Metric:

@@ -24,9 +24,10 @@ from scipy.ndimage import maximum_filter1d
 
 #: Order of the autoregression.
 ORDER = 8
-#: Smallest noise that is believed [unit of each channel]: below it a channel is taken as exact.
-LEAST = {'wheel_left': 0.004, 'wheel_right': 0.004, 'yaw_rate': 0.001, 'advance': 0.002,
-         'turn': 0.001}
+#: Names of the smallest noise that is believed, by channel.
+_LEAST = {'wheel_left': 'least_noise_wheels', 'wheel_right': 'least_noise_wheels',
+          'yaw_rate': 'least_noise_yaw_rate', 'advance': 'least_noise_advance',
+          'turn': 'least_noise_turn'}
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +224,7 @@ def scales(observations: Observations, residual: FloatArray, predicted: FloatArr
         slices = [s for s in observations.slices if s.channel == name]
         steps = np.concatenate([np.diff(residual[s.first:s.last]) for s in slices])
         level = max(spread(steps), stepwise(steps)) / np.sqrt(2.0)
-        level = max(level, LEAST[name])
+        level = max(level, setting(_LEAST[name]))
         whole = np.concatenate([residual[s.first:s.last] for s in slices])
         wide = spread(whole)
         for s in slices:
@@ -301,6 +302,21 @@ def metric(observations: Observations, residual: FloatArray, scale: FloatArray,
                   if s.channel == name]
         filters[name] = _taps(scaled, order)
     return Metric(scale, filters, parts)
+
+
+def believable(observations: Observations, one: Metric) -> Metric:
+    """
+    Return a metric whose noise is nowhere below the smallest that is believed.
+
+    The residual of a perfect fit is rounding; no sensor could tell two such fits apart.
+    """
+    filters = {}
+    for name in observations.channels:
+        sharpest = max(float(np.max(one.scale[s.first:s.last], initial=0.0))
+                       for s in observations.slices if s.channel == name)
+        filters[name] = one.filters[name] / max(
+            1.0, float(one.filters[name][0]) * sharpest * setting(_LEAST[name]))
+    return Metric(one.scale, filters, one.parts)
 
 
 def _taps(parts: list[FloatArray], order: int) -> FloatArray:
