@@ -68,8 +68,8 @@ class Fit:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before the estimates are used; parameters at their bounds among it."""
-        return self.result.warnings
+        """What to know before the estimates are used: losses, parameters at their bounds."""
+        return (*[self.result.loss] * bool(self.result.loss), *self.result.warnings)
 
     @property
     def undetermined(self) -> tuple[str, ...]:

@@ -8,6 +8,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 import time
 
+from lg_husky_sim.comparison.metrics import channel_errors, pooled
+from lg_husky_sim.comparison.metrics import UNITS as DRIVEN_UNITS
+from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.errors import FitError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
@@ -172,7 +175,8 @@ def _result(model: ModelFile, baseline: ModelFile, segments: Sequence[Segment], 
         method, seed, fitted, _recordings(segments), estimates, sure.correlation,
         sure.covariance, sure.condition, cost, evaluations, time.perf_counter() - began,
         channel_fits(problem.observations, segments, baseline, fitted, solution),
-        starts, history, undetermined(sure, values), warnings, converged, drawn, states)
+        starts, history, undetermined(sure, values), warnings, converged, drawn, states,
+        driven_fits(segments, baseline, fitted))
 
 
 def _profile(problem: Problem, solution: Solution, sure: Confidence, name: str,
@@ -233,6 +237,16 @@ def channel_fits(data: Observations, segments: Sequence[Segment], before: ModelF
         rms = [float(np.sqrt(np.mean(np.concatenate(square)))) for square in squares]
         rows.append(ChannelFit('position', 'm', sum(len(s) for s in squares[0]), rms[0], rms[1]))
     return tuple(rows)
+
+
+def driven_fits(segments: Sequence[Segment], before: ModelFile, after: ModelFile
+                ) -> tuple[ChannelFit, ...]:
+    """Compare two models driven by the commands alone from the start of each segment."""
+    plants = [compile_model(m.structure).at(m.parameters) for m in (before, after)]
+    old, new = (pooled(channel_errors(segment, replay(plant, segment)) for segment in segments)
+                for plant in plants)
+    return tuple(ChannelFit(name, DRIVEN_UNITS[name], one.count, one.rmse, new[name].rmse)
+                 for name, one in old.items() if name in new)
 
 
 def _warnings(solution: Solution, estimates: Sequence[Estimated],

@@ -17,17 +17,13 @@ from typing import Any
 
 from lg_husky_sim.identification.problem import Observations
 from lg_husky_sim.identification.relations import apart, coefficients
-from lg_husky_sim.identification.settings import setting
+from lg_husky_sim.identification.settings import least_noise, setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 #: Order of the autoregression.
 ORDER = 8
-#: Names of the smallest noise that is believed, by channel.
-_LEAST = {'wheel_left': 'least_noise_wheels', 'wheel_right': 'least_noise_wheels',
-          'yaw_rate': 'least_noise_yaw_rate', 'advance': 'least_noise_advance',
-          'turn': 'least_noise_turn'}
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +220,7 @@ def scales(observations: Observations, residual: FloatArray, predicted: FloatArr
         slices = [s for s in observations.slices if s.channel == name]
         steps = np.concatenate([np.diff(residual[s.first:s.last]) for s in slices])
         level = max(spread(steps), stepwise(steps)) / np.sqrt(2.0)
-        level = max(level, setting(_LEAST[name]))
+        level = max(level, least_noise(name))
         whole = np.concatenate([residual[s.first:s.last] for s in slices])
         wide = spread(whole)
         for s in slices:
@@ -315,7 +311,7 @@ def believable(observations: Observations, one: Metric) -> Metric:
         sharpest = max(float(np.max(one.scale[s.first:s.last], initial=0.0))
                        for s in observations.slices if s.channel == name)
         filters[name] = one.filters[name] / max(
-            1.0, float(one.filters[name][0]) * sharpest * setting(_LEAST[name]))
+            1.0, float(one.filters[name][0]) * sharpest * least_noise(name))
     return Metric(one.scale, filters, one.parts)
 
 

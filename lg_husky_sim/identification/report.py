@@ -187,12 +187,7 @@ def report_data(result: FitResult, segments: Sequence[Segment], before: ModelFil
 
 def _headline(result: FitResult, table: ErrorTable) -> Headline:
     bound = sum(1 for one in result.estimates if _parameter(one, result.model).at_bound)
-    worse = [row.name for row in table.rows
-             if row.values.get(FITTED, math.nan) > 1.05 * row.values.get(BEFORE, math.nan)]
-    warnings = list(result.warnings)
-    if worse:
-        warnings.append('Driven by the commands alone, the fitted model predicts worse than the '
-                        f'one before: {", ".join(name.split(" [")[0] for name in worse)}.')
+    warnings = [*[result.loss] * bool(result.loss), *result.warnings]
     count = plural(len(result.estimates), 'parameter')
     if not result.converged:
         return Headline(f'Not converged: {count} of {plural(len(result.recordings), "recording")}',

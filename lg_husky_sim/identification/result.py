@@ -12,9 +12,9 @@ from typing import Any
 
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.profile import Profile
-from lg_husky_sim.identification.settings import setting
+from lg_husky_sim.identification.settings import least_noise, setting
 from lg_husky_sim.identification.start_states import HEAD, StartState, summary
-from lg_husky_sim.reporting.words import plural, quantity
+from lg_husky_sim.reporting.words import change, plural, quantity
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -129,6 +129,9 @@ class FitResult:
     start_states : tuple of StartState
         Corrections of the measured state at the start of each segment, if asked for. They are
         not among ``estimates``, whose intervals and correlations allow for them.
+    driven : tuple of ChannelFit
+        Both models driven by the commands alone from the start of each segment, without the
+        resets of ``channels``.
     """
 
     method: Method
@@ -150,6 +153,22 @@ class FitResult:
     converged: bool = True
     profiles: tuple[Profile, ...] = ()
     start_states: tuple[StartState, ...] = ()
+    driven: tuple[ChannelFit, ...] = ()
+
+    @property
+    def losses(self) -> tuple[ChannelFit, ...]:
+        """What the fitted model predicts worse than the one before, driven by commands alone."""
+        return tuple(one for one in self.driven
+                     if one.after > (1.0 + setting('worse')) * one.before
+                     and one.after > least_noise(one.name))
+
+    @property
+    def loss(self) -> str:
+        """The same in a sentence; '' for nothing."""
+        said = ', '.join(f'{quantity(one.name)} {change(one.before, one.after)}'
+                         for one in self.losses)
+        return ('Driven by the commands alone, the fitted model predicts worse than the one '
+                f'before: {said}') if said else ''
 
     @property
     def values(self) -> dict[str, float]:
@@ -162,7 +181,8 @@ class FitResult:
                  f'{", ".join(self.recordings)}',
                  f'method {self.method.value}, seed {self.seed}, {self.evaluations} simulations, '
                  f'{self.seconds:.2f} s, cost {self.cost:.6g}, '
-                 f'{"converged" if self.converged else "NOT CONVERGED"}', '']
+                 f'{"converged" if self.converged else "NOT CONVERGED"}',
+                 *[self.loss] * bool(self.loss), '']
         width = max([9, *(len(one.name) for one in self.estimates)])
         lines.append(f'{"parameter":<{width}}  {"value":>11}  {"95 % interval":>25}  '
                      f'{"before":>11}  unit')
@@ -207,8 +227,8 @@ class FitResult:
                 'high': one.high, 'before': one.start, 'nuisance': one.nuisance}
                 for one in self.estimates],
             'correlation': self.correlation.tolist(), 'covariance': self.covariance.tolist(),
-            'channels': [{'name': c.name, 'unit': c.unit, 'count': c.count,
-                          'rms_before': c.before, 'rms_after': c.after} for c in self.channels],
+            'channels': _channels(self.channels), 'driven': _channels(self.driven),
+            'losses': [one.name for one in self.losses],
             'starts': [{'values': dict(s.values), 'cost': _finite(s.cost),
                         'converged': s.converged} for s in self.starts],
             'history': [[_finite(cost) for cost in row] for row in self.history],
@@ -219,6 +239,11 @@ class FitResult:
             'start_states': [asdict(s) for s in self.start_states],
             'undetermined': list(self.undetermined), 'warnings': list(self.warnings),
         }
+
+
+def _channels(fits: Sequence[ChannelFit]) -> list[dict[str, object]]:
+    return [{'name': c.name, 'unit': c.unit, 'count': c.count, 'rms_before': c.before,
+             'rms_after': c.after} for c in fits]
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:

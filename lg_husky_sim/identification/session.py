@@ -144,6 +144,7 @@ def each_table(names: Sequence[str], results: Sequence[FitResult]) -> str:
     for name, result in zip(names, results, strict=True):
         cells = [f'{one.value:.5g} ± {0.5 * (one.high - one.low):.2g}'
                  for one in result.estimates]
-        flag = '' if result.converged and not result.warnings else '  (see its report)'
+        flag = '' if result.converged and not (result.warnings or result.losses) else (
+            '  (see its report)')
         lines.append(f'{name:<{width}}  ' + '  '.join(f'{c:>22}' for c in cells) + flag)
     return '\n'.join(lines)

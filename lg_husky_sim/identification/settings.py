@@ -9,6 +9,10 @@ from functools import cache
 
 from lg_husky_sim.settings import numbers
 
+#: What the smallest noise of a channel is called where it has not the channel's own name.
+_NOISE = {'wheel_left': 'wheels', 'wheel_right': 'wheels', 'wheel_speed': 'wheels',
+          'forward': 'advance'}
+
 
 @cache
 def settings() -> Mapping[str, float]:
@@ -19,3 +23,8 @@ def settings() -> Mapping[str, float]:
 def setting(name: str) -> float:
     """Return one number of ``config/identification.yaml`` [its unit there]."""
     return settings()[name]
+
+
+def least_noise(channel: str) -> float:
+    """Return the smallest noise of a channel that is believed [the channel's unit]."""
+    return setting(f'least_noise_{_NOISE.get(channel, channel)}')

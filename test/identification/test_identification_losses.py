@@ -1,0 +1,52 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a fitted model predicts worse than the one before is said wherever the fit is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import lg_husky_sim as lg
+from lg_husky_sim.cli.main import run
+import pytest
+
+WORSE = 'Driven by the commands alone, the fitted model predicts worse than the one before: '
+
+
+def test_a_loss_stands_under_the_headline_in_every_file(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Mass and damping cannot make up for dry scrub, and are wrong for what they can explain."""
+    robot = lg.Husky().with_effect('yaw_scrub_coulomb', yaw_coulomb_moment=8.0)
+    robot.simulate('s_bend').save(tmp_path / 'drive')
+    out = tmp_path / 'fit.yaml'
+    assert run(['identify', str(tmp_path / 'drive'), '--free', 'wheel_damping,mass', '--out',
+                str(out)]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    text = out.with_suffix('.txt').read_text(encoding='utf-8').splitlines()
+    assert printed[2].startswith(WORSE)
+    assert text[2] == printed[2]
+    for quantity in ('yaw rate +', 'heading +', 'position +'):
+        assert quantity in text[2]
+    data = json.loads(out.with_suffix('.json').read_text(encoding='utf-8'))
+    assert data['losses'] == ['yaw_rate', 'heading', 'position']
+    driven = {one['name']: one for one in data['driven']}
+    grown = driven['position']['rms_after'] / driven['position']['rms_before']
+    assert f'position +{100.0 * (grown - 1.0):.0f}\u00a0%' in text[2]
+    page = out.with_suffix('.html').read_text(encoding='utf-8')
+    assert WORSE in page
+    assert f'+{100.0 * (grown - 1.0):.0f}\u00a0%' in page
+
+
+def test_a_model_that_fits_better_has_no_loss() -> None:
+    fit = lg.Husky().identify(lg.Husky(wheel_damping=1.6).simulate('s_bend'), ['wheel_damping'],
+                              progress=False)
+    assert fit.result.driven
+    assert fit.data()['losses'] == []
+    assert WORSE not in str(fit)
+    assert fit.warnings == ()
+
+
+def test_rounding_is_no_loss() -> None:
+    fit = lg.Husky().identify(lg.Husky().simulate('s_bend'), progress=False)
+    assert fit.result.losses == ()
