@@ -63,6 +63,8 @@ class StepResponse:
         What each output settles at, NaN where it does not.
     left_out : str
         What it is without, as it is not linear; '' for nothing.
+    unsettled : str
+        Which outputs have no steady state, and why; '' for none.
     """
 
     times: FloatArray
@@ -73,6 +75,7 @@ class StepResponse:
     source_unit: str
     final: FloatArray
     left_out: str = ''
+    unsettled: str = ''
 
     def __post_init__(self) -> None:
         """Set the arrays read-only."""
@@ -186,12 +189,13 @@ class StepResponse:
 
     def __str__(self) -> str:
         """Return the table as text."""
-        return f'{_lines(self._title, self.left_out)}\n{self.table()}'
+        return _lines(self._title, self.left_out, str(self.table()), self.unsettled)
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return page_part(self._title, [self.left_out] * bool(self.left_out), [self.table()])
+        return page_part(self._title, [*filter(None, (self.left_out, self.unsettled))],
+                         [self.table()])
 
 
 @dataclass(frozen=True, eq=False)

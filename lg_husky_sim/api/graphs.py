@@ -9,12 +9,13 @@ from contextlib import contextmanager
 from functools import cached_property
 import os
 from pathlib import Path
+import re
 from typing import Any
 
 from lg_husky_sim.api.responses import Responses
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.api.transfer_functions import warn_of
-from lg_husky_sim.errors import GraphError, LgHuskyError, ParameterError
+from lg_husky_sim.errors import GraphError, LgHuskyError, ModelFileError, ParameterError
 from lg_husky_sim.linear_graph import (
     compile_numeric,
     derive,
@@ -23,7 +24,14 @@ from lg_husky_sim.linear_graph import (
     StateSpace,
     SymbolicStateSpace,
 )
-from lg_husky_sim.linear_graph.netlist import netlist_of, parse_netlist, read_netlist
+from lg_husky_sim.linear_graph.netlist import (
+    Netlist,
+    netlist_of,
+    parse_netlist,
+    read_netlist,
+)
+
+_ELEMENTS = re.compile(r'\belements\s*:')
 
 
 class Graph(Responses):
@@ -301,19 +309,20 @@ def graph(source: str | os.PathLike[str] | dict[str, Any] | LinearGraph,
     Parameters
     ----------
     source : path-like, str, dict or LinearGraph
-        A netlist file, the text of one (with a line break in it), its content as a dict, a graph
-        made in Python; or ``simplified`` or ``expanded``, the paper's two graphs of the Husky.
+        A netlist file, the text of one, its content as a dict, a graph made in Python; a model
+        file; or ``simplified`` or ``expanded``, the paper's two graphs of the Husky.
     outputs : sequence of str
         Variables to put out, such as ``'omega(J_1)'``; those of the netlist by default.
 
     Returns
     -------
     Graph
+        Of a model file a :class:`~lg_husky_sim.Husky`, which is one.
 
     Raises
     ------
     ModelFileError
-        If the file is no netlist.
+        If the file is neither a netlist nor a model file.
     GraphError
         If the graph cannot be built.
     TypeError
@@ -328,11 +337,32 @@ def graph(source: str | os.PathLike[str] | dict[str, Any] | LinearGraph,
     if isinstance(source, LinearGraph):
         return Graph('linear graph', source, {}, outputs)
     if isinstance(source, dict):
-        netlist = netlist_of(source)
-    elif isinstance(source, str) and '\n' in source:
-        netlist = parse_netlist(source)
-    else:
-        netlist = read_netlist(Path(source))
-    text = isinstance(source, dict) or '\n' in str(source)
+        return _of_netlist(netlist_of(source), outputs)
+    if isinstance(source, str) and ('\n' in source or _ELEMENTS.search(source)):
+        return _of_netlist(parse_netlist(source), outputs)
+    if not os.fspath(source):
+        raise ModelFileError('no netlist given: the source is empty')
+    return _of_file(Path(source), outputs)
+
+
+def _of_netlist(netlist: Netlist, outputs: Sequence[str], source: str = '') -> Graph:
     return Graph(netlist.name, netlist.graph, netlist.values, outputs or netlist.outputs,
-                 netlist.about, '' if text else str(source))
+                 netlist.about, source)
+
+
+def _is_model(path: Path) -> bool:
+    from lg_husky_sim.yaml_files import read_yaml
+    try:
+        top = read_yaml(path, ModelFileError)
+    except ModelFileError:      # which the netlist's reader says
+        return False
+    return 'elements' not in top and not {'schema', 'structure'}.isdisjoint(top)
+
+
+def _of_file(path: Path, outputs: Sequence[str]) -> Graph:
+    if not _is_model(path):
+        return _of_netlist(read_netlist(path), outputs, str(path))
+    from lg_husky_sim.api.robots import Husky
+    husky = Husky(path)
+    husky.outputs = tuple(outputs) or husky.outputs
+    return husky

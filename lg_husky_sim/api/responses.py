@@ -5,11 +5,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lg_husky_sim.api.curves import FrequencyResponse, StepResponse
-from lg_husky_sim.api.transfer_functions import TransferFunction, warn_of
+from lg_husky_sim.api.transfer_functions import root_text, TransferFunction, warn_of
 from lg_husky_sim.errors import GraphError
 from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, StateSpace
 import numpy as np
@@ -134,14 +134,15 @@ class Responses(ABC):
         space = self._space(first if output else '', values)
         moments = usual_times(space.poles) if times is None else checked_times(times)
         found = step_response(space, moments, space.inputs.index(source))
-        final = final_values(space, space.inputs.index(source))
+        final, unsettled = final_values(space, space.inputs.index(source)), ''
         if final is None:       # an output may settle all the same
             answers = [self._in_numbers(name, source, values) for name in space.outputs]
             final = np.array([one.dc_gain if (one.poles.real < 0.0).all() else np.nan
                               for one in answers])
+            unsettled = _unsettled(answers)
         return StepResponse(
             moments, found, space.outputs, tuple(map(self._unit, space.outputs)), source,
-            self._unit(source), final, self.left_out)
+            self._unit(source), final, self.left_out, unsettled)
 
     def bode(self, rates: ArrayLike | None = None, output: str = '', source: str = '',
              **values: float) -> FrequencyResponse:
@@ -223,3 +224,18 @@ class Responses(ABC):
             return own
         below = unit_of(self.graph, over)
         return '' if own == below else quotient(own, below)
+
+
+def _unsettled(answers: Sequence[TransferFunction]) -> str:
+    """Say which outputs have no steady state, and for which poles."""
+    why: dict[str, list[str]] = {}
+    for one in answers:
+        worst = max(one.poles, key=lambda pole: (pole.real, -abs(pole)), default=-1.0)
+        if worst == 0.0:
+            why.setdefault('a pole at 0 integrates the input', []).append(one.output)
+        elif worst.real > 0.0:
+            why.setdefault(f'a pole at {root_text(worst)} 1/s grows', []).append(one.output)
+        elif worst.real == 0.0:
+            why.setdefault('a pair of poles without damping swings on', []).append(one.output)
+    said = '; '.join(f'{", ".join(names)} ({reason})' for reason, names in why.items())
+    return f'No steady state: {said}' if said else ''

@@ -70,24 +70,12 @@ def command(graph: str | None, model: str | None, outputs: tuple[str, ...],
 
 def _load(model: str, outputs: tuple[str, ...]) -> Graph:
     """Find the graph with numbers and outputs that the option names."""
-    import difflib
-
     from lg_husky_sim.api.graphs import graph
-    from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.errors import ModelFileError
-    from lg_husky_sim.yaml_files import read_yaml
 
     if model in PAPER:
         return graph(model, outputs)
     path = Path(model)
     if path.suffix not in ('.yaml', '.yml'):
         raise ModelFileError(f'model {model!r} must be {", ".join(PAPER)} or a .yaml file')
-    try:
-        top = read_yaml(path, ModelFileError)
-    except ModelFileError as error:
-        raise ModelFileError(f'{path}: {error}') from error
-    if 'elements' in top or difflib.get_close_matches('elements', top, cutoff=0.8):
-        return graph(path, outputs)
-    husky = Husky(path)
-    husky.outputs = outputs or husky.outputs
-    return husky
+    return graph(path, outputs)

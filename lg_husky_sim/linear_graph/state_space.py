@@ -90,8 +90,19 @@ class StateSpace:
 
     @property
     def poles(self) -> NDArray[np.complex128]:
-        """Eigenvalues of A [1/s], shape (n,), slowest last, real first where equal."""
+        """
+        Eigenvalues of A [1/s], shape (n,), slowest last, real first where equal.
+
+        Parts that are no larger than rounding makes of a zero are zero.
+        """
+        from scipy.linalg import matrix_balance
+
         found: NDArray[np.complex128] = np.linalg.eigvals(self.A).astype(np.complex128)
+        if found.size:
+            rounding = found.size * np.finfo(float).eps * float(np.linalg.norm(
+                matrix_balance(self.A)[0]))
+            found.real[np.abs(found.real) <= rounding] = 0.0
+            found.imag[np.abs(found.imag) <= rounding] = 0.0
         return found[np.lexsort((found.imag, found.real))]
 
     def standard_form(self) -> StateSpace:
