@@ -41,6 +41,35 @@ def check_folder(path: Path) -> None:
 
 
 @contextmanager
+def scratch_beside(path: Path) -> Iterator[Path]:
+    """
+    Make a scratch folder for what becomes a file or folder, on its file system.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        What shall be written; the folder that it is in is made.
+
+    Yields
+    ------
+    pathlib.Path
+        Removed when the block ends, with what is still in it.
+
+    Raises
+    ------
+    OSError
+        If nothing can be written there; it names `path`, not the scratch folder.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        holder = tempfile.TemporaryDirectory(prefix=f'.{path.name}.', dir=path.parent)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    with holder as scratch:
+        yield Path(scratch)
+
+
+@contextmanager
 def result_folder(path: Path, marker: str) -> Iterator[Path]:
     """
     Make a folder of results, whole or not at all.

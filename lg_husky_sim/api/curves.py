@@ -12,6 +12,7 @@ from lg_husky_sim.api.axes import axes_or_new
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.extras import require
+from lg_husky_sim.linear_graph.graph import suggestion
 import numpy as np
 from numpy.typing import NDArray
 
@@ -96,7 +97,7 @@ class StepResponse:
             If there is no such output.
         """
         if name not in self.names:
-            raise ParameterError(f'no output {name!r}; there are {", ".join(self.names)}')
+            raise ParameterError(f'no output {name!r}{suggestion(name, self.names)}')
         return self.values[:, self.names.index(name)]
 
     def to_pandas(self) -> Any:

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SCHEMA = 'lg_husky_sim/survey/1'
+MOST_DECIMALS = 6
+"""Most decimals of a number beside its half width."""
 
 
 @cache
@@ -226,12 +228,17 @@ def _related(related: Sequence[Relation]) -> Table:
     """Return what each stream says of the others, without a model of the robot."""
     return Table('Sensors compared with each other (factor: reference over source)', (
         'quantity', 'source', 'reference', 'factor', 'lag of the source [s]', 'explained'), tuple(
-        (one.quantity, one.source, one.reference, _number(one.factor, 4), _number(one.late, 2),
+        (one.quantity, one.source, one.reference,
+         _number(one.factor, 4) + ' m/rad' * (one.source == 'wheels'), _number(one.late, 2),
          f'{100.0 * max(one.explained, 0.0):.0f} %') for one in related))
 
 
 def _number(one: Number, digits: int) -> str:
-    return f'{one.value:.{digits}f} ±{0.5 * (one.high - one.low):.{digits}f}'
+    # In so many decimals, or in as many as it takes for the half width not to read as zero.
+    half = 0.5 * (one.high - one.low)
+    while half > 0.0 and digits < MOST_DECIMALS and not round(half, digits):
+        digits += 1
+    return f'{one.value:.{digits}f} ±{half:.{digits}f}'
 
 
 def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relation]

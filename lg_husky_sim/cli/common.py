@@ -18,8 +18,10 @@ from click.shell_completion import CompletionItem
 
 if TYPE_CHECKING:
     _TextType = click.ParamType[str]
+    _ChoiceType = click.Choice[str]
 else:
     _TextType = click.ParamType  # generic since click 8.4 only
+    _ChoiceType = click.Choice
 
 Function = TypeVar('Function', bound=Callable[..., object])
 #: Stages that end within this time are not worth a line in a log [s].
@@ -158,6 +160,22 @@ def spoken(*, page: bool = False, data: bool = True) -> Callable[[Function], Fun
             wrapped = option(wrapped)
         return wrapped  # type: ignore[return-value]
     return decorate
+
+
+class OneOf(_ChoiceType):
+    """One of some words; for another one, the nearest is suggested."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+                ) -> Any:
+        """Return the word, or say which there are."""
+        import difflib
+
+        known = [str(word) for word in self.choices]
+        if value not in known:
+            near = difflib.get_close_matches(str(value), known, n=1)
+            hint = f'; did you mean {near[0]}?' if near else ''
+            self.fail(f'{value!r} is not one of {", ".join(known)}{hint}', param, ctx)
+        return super().convert(value, param, ctx)
 
 
 class Words(_TextType):

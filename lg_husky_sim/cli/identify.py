@@ -11,6 +11,7 @@ from lg_husky_sim.cli.common import (
     EFFECTS,
     model_option,
     NUISANCES,
+    OneOf,
     Output,
     PARAMETERS,
     RECORDING,
@@ -35,7 +36,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @click.option('--effects', multiple=True, metavar='IDS', type=EFFECTS,
               help='Effects of the catalogue to add, separated by commas: id, id:side or '
                    'id:shape; command_latency,command_limit:yaw, for instance.')
-@click.option('--method', type=click.Choice(['least-squares', 'ga', 'de']),
+@click.option('--method', type=OneOf(['least-squares', 'ga', 'de']),
               default='least-squares', show_default=True,
               help="Least squares on all outputs; or the paper's genetic algorithm, or "
                    'differential evolution, on the position alone (eq. 23).')

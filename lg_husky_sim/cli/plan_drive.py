@@ -122,14 +122,13 @@ def _from_folder(folder: Path) -> tuple[Rival, Rival]:
 
 
 def _write(out: Path, manoeuvre: Manoeuvre, about: str) -> None:
-    import tempfile
-
+    from lg_husky_sim.folders import scratch_beside
     from lg_husky_sim.manoeuvres import SCHEMA
     from lg_husky_sim.yaml_files import yaml_text
     data = {'schema': SCHEMA, 'about': about, 'rate': manoeuvre.rate, 'steps': [
         {'duration': round(s.duration, 3), 'forward': round(s.forward, 4),
          'yaw': round(s.yaw, 4), 'ramp': round(s.ramp, 3)} for s in manoeuvre.steps]}
-    with tempfile.TemporaryDirectory(dir=out.resolve().parent, prefix='.plan.') as scratch:
-        draft = Path(scratch) / 'script.yaml'
+    with scratch_beside(out) as scratch:
+        draft = scratch / 'script.yaml'
         draft.write_text(yaml_text(data, flow=None), encoding='utf-8')
         os.replace(draft, out)

@@ -9,6 +9,7 @@ import json
 from typing import Any
 
 import click
+from lg_husky_sim.cli.common import OneOf
 
 
 def _graph() -> dict[str, Any]:
@@ -43,7 +44,7 @@ def schema_of(file: str) -> dict[str, Any]:
 
 
 @click.command(short_help='Print the JSON schema of a YAML file, for editors.')
-@click.argument('file', type=click.Choice(list(FILES)))
+@click.argument('file', type=OneOf(list(FILES)))
 def command(file: str) -> None:
     """
     Print the JSON schema of a kind of YAML file.

@@ -39,6 +39,8 @@ class OnsetKind(enum.Enum):
     PLACE_BELOW = 'place_below'
 
 
+#: Most effects that an unknown name is taken to mean; a part of more names means none of them.
+MOST_MEANT = 3
 #: What the names of a changed effect's numbers end in.
 LATER = '_later'
 
@@ -385,6 +387,6 @@ def effect_kind(name: str) -> EffectKind:
         offered = catalogue()
         near = difflib.get_close_matches(name, offered, n=1) or [
             one for one, kind in offered.items() if name and (name in one or name in kind.name)]
-        hint = f'; did you mean {" or ".join(near)}?' if near else ''
+        hint = f'; did you mean {" or ".join(near)}?' if 0 < len(near) <= MOST_MEANT else ''
         raise ParameterError(f'unknown effect {shown(name)}{hint} (known: {", ".join(offered)})')
     return known[name]

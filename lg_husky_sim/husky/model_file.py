@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 import os
 from pathlib import Path
-import tempfile
 
 from lg_husky_sim.errors import LgHuskyError, ModelFileError, ParameterError
+from lg_husky_sim.folders import scratch_beside
 from lg_husky_sim.husky.by_hand import about_of, Number, other_robot, with_numbers
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.model_reader import read_model
@@ -228,13 +228,7 @@ def save_model(model: ModelFile, path: str | os.PathLike[str]) -> None:
         Replaced if it is there.
     """
     place = Path(path)
-    place.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=place.parent, prefix=f'.{place.name}.')
-    try:
-        with os.fdopen(handle, 'w', encoding='utf-8') as stream:
-            stream.write(yaml_text(model_data(model)))
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, place)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    with scratch_beside(place) as scratch:
+        draft = scratch / place.name
+        draft.write_text(yaml_text(model_data(model)), encoding='utf-8')
+        os.replace(draft, place)

@@ -11,12 +11,12 @@ import json
 import math
 import os
 from pathlib import Path
-import tempfile
 
 from lg_husky_sim.comparison.outcome import RANKED
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.traces import error_table, Predicted, traces_of
 from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.folders import scratch_beside
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile, save_model
 from lg_husky_sim.identification.profile import LEVEL, Profile
@@ -90,10 +90,8 @@ def files_together(paths: Sequence[Path]) -> Iterator[Mapping[Path, Path]]:
     mapping of pathlib.Path to pathlib.Path
         Where to write each; they are moved into place when the block ends without an exception.
     """
-    folder = paths[0].parent
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix='.lg_husky.', dir=folder) as scratch:
-        places = {path: Path(scratch) / path.name for path in paths}
+    with scratch_beside(paths[0]) as scratch:
+        places = {path: scratch / path.name for path in paths}
         yield places
         for path, place in places.items():
             os.replace(place, path)

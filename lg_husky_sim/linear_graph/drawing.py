@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Collection
 import os
 from pathlib import Path
-import tempfile
 from typing import Any
 
 from lg_husky_sim.errors import GraphError
 from lg_husky_sim.extras import require
+from lg_husky_sim.folders import scratch_beside
 from lg_husky_sim.linear_graph.elements import Domain
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.layout import Block, Curve, HEIGHT, layout, Point
@@ -204,11 +204,10 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
     if title:
         figure.suptitle(title, fontsize=11, y=1.0 - 0.4 * HEADING / inches, va='center',
                         parse_math=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
     # a fixed salt and no date: the same graph gives the same file
-    with tempfile.TemporaryDirectory(dir=path.parent) as folder, rc_context(
+    with scratch_beside(path) as folder, rc_context(
             {'svg.hashsalt': 'lg_husky_sim', 'svg.fonttype': 'none'}):
-        draft = Path(folder) / f'picture{path.suffix.lower()}'
+        draft = folder / f'picture{path.suffix.lower()}'
         metadata = {'.svg': {'Date': None}, '.pdf': {'CreationDate': None}}
         figure.savefig(draft, dpi=150, metadata=metadata.get(path.suffix.lower(), {}))
         os.replace(draft, path)

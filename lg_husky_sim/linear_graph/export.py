@@ -10,11 +10,11 @@ import json
 import os
 from pathlib import Path
 import re
-import tempfile
 from typing import Any
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.extras import require
+from lg_husky_sim.folders import scratch_beside
 from lg_husky_sim.linear_graph.state_space import FloatArray, MATRICES, StateSpace
 import numpy as np
 
@@ -145,9 +145,8 @@ def export(space: StateSpace, path: str | os.PathLike[str], name: str = 'model',
     place = Path(path)
     check_export(place)
     content = _WRITERS[place.suffix](space, name, dict(parameters or {}))
-    place.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix='.lg_husky.', dir=place.parent) as scratch:
-        draft = Path(scratch) / place.name
+    with scratch_beside(place) as scratch:
+        draft = scratch / place.name
         draft.write_bytes(content)
         os.replace(draft, place)
     return place

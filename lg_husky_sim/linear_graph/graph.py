@@ -305,4 +305,4 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     if close := close_name(name, known, cutoff=0.6):
         return close
     shown = ', '.join(known[:12]) + (', ...' if len(known) > 12 else '')
-    return f'; there are {shown}' if known else ''
+    return f'; there {"is" if len(known) == 1 else "are"} {shown}' if known else ''

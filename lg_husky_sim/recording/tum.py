@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-import tempfile
 
+from lg_husky_sim.folders import scratch_beside
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 
@@ -30,15 +30,14 @@ def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0)
     pathlib.Path
     """
     place = Path(path)
-    place.parent.mkdir(parents=True, exist_ok=True)
     stamps = start_ns + np.round(pose.times * 1e9).astype(np.int64)
     lines = ['# timestamp x y z qx qy qz qw']
     for stamp, (x, y, heading) in zip(stamps.tolist(), pose.values.tolist(), strict=True):
         # Written from integers: a float of seconds since 1970 holds no nanoseconds.
         lines.append(f'{stamp // 10**9}.{stamp % 10**9:09d} {x:.9g} {y:.9g} 0 0 0 '
                      f'{np.sin(0.5 * heading):.12g} {np.cos(0.5 * heading):.12g}')
-    with tempfile.TemporaryDirectory(prefix='.lg_husky.', dir=place.parent) as scratch:
-        draft = Path(scratch) / place.name
+    with scratch_beside(place) as scratch:
+        draft = scratch / place.name
         draft.write_text('\n'.join(lines) + '\n', encoding='utf-8')
         os.replace(draft, place)
     return place

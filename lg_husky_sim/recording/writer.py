@@ -9,11 +9,11 @@ import heapq
 from importlib.util import find_spec
 from os import PathLike, replace
 from pathlib import Path
-import tempfile
 from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.extras import require
+from lg_husky_sim.folders import scratch_beside
 from lg_husky_sim.recording.messages import Maker, Messages
 from lg_husky_sim.recording.recording import check_stream
 from lg_husky_sim.recording.rosbag2 import available, Rosbag2Output
@@ -141,13 +141,12 @@ def _whole(target: Path, makers: Callable[[Types], list[Maker]], storage: str,
     check_target(target, overwrite=overwrite)
     if not _by_ros():
         require('rosbags', 'write recordings')
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=target.parent) as scratch:
-        made = Path(scratch) / target.name  # files inside a bag carry the bag's name
+    with scratch_beside(target) as scratch:
+        made = scratch / target.name  # files inside a bag carry the bag's name
         _write(made, makers, storage, start_ns)
         if target.exists():
             check_target(target, overwrite=overwrite)
-            replace(target, Path(scratch) / 'previous')
+            replace(target, scratch / 'previous')
         replace(made, target)
     return target
 

@@ -1,0 +1,75 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Mistyped words and places that cannot be written are answered by what the user gave."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import lg_husky_sim as lg
+from lg_husky_sim.cli.main import run
+from lg_husky_sim.errors import GraphError, ParameterError
+from lg_husky_sim.husky.effects import effect_kind
+import pytest
+
+GRAPH = """
+elements:
+  F: {is: force source, from: ground, to: m}
+  M: {is: mass, from: m, value: 2}
+outputs: [v(M)]
+"""
+
+
+@pytest.mark.parametrize(('arguments', 'said'), [
+    (['schema', 'modle'],
+     "'modle' is not one of graph, model, commands, sim_node; did you mean model?"),
+    (['identify', 'drive', '--out', 'x.yaml', '--method', 'least-square'],
+     "'least-square' is not one of least-squares, ga, de; did you mean least-squares?")])
+def test_a_mistyped_choice_gets_the_nearest_one(
+        arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(arguments) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_letter_is_not_taken_for_half_of_the_catalogue() -> None:
+    with pytest.raises(ParameterError) as caught:
+        effect_kind('a')
+    assert str(caught.value).startswith("unknown effect 'a' (known: ")
+    with pytest.raises(ParameterError, match='did you mean yaw_scrub_coulomb or yaw_scrub_speed'):
+        effect_kind('scrub')
+
+
+def test_one_input_is_one() -> None:
+    with pytest.raises(GraphError, match=r"unknown input 'G'; there is F$"):
+        lg.graph(GRAPH).step(source='G')
+    with pytest.raises(ParameterError, match=r"no output 'x'; there is v\(M\)$"):
+        lg.graph(GRAPH).step().column('x')
+
+
+@pytest.mark.skipif(not Path('/proc/self').exists(), reason='a folder that takes no file')
+@pytest.mark.parametrize('arguments', [
+    ['simulate', '--commands', 'spin', '--out', '/proc/none'],
+    ['derive', '--picture', '/proc/none.svg'], ['derive', '--export', '/proc/none.json']])
+def test_what_cannot_be_written_is_called_as_it_was_given(
+        arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(arguments) == 1
+    error, = (line for line in capsys.readouterr().err.splitlines() if 'error' in line)
+    assert error.startswith(f'error: {arguments[-1]}: ')
+
+
+def test_a_model_is_saved_where_it_can_be_read(tmp_path: Path) -> None:
+    path = lg.Husky().save(tmp_path / 'new' / 'model.yaml')
+    assert [one.name for one in path.parent.iterdir()] == ['model.yaml']
+    assert path.stat().st_mode & 0o400
+    with pytest.raises(OSError, match=r'none\.yaml') as caught:
+        lg.Husky().save('/proc/none.yaml')
+    assert caught.value.filename == '/proc/none.yaml'
+
+
+def test_a_factor_between_sensors_has_its_unit_and_width() -> None:
+    table = str(lg.Husky().simulate('s_bend').info())
+    line = next(line for line in table.splitlines() if line.startswith('speed'))
+    assert ' m/rad ' in line
+    assert '±0.0000 ' not in line
+    gyro = next(line for line in table.splitlines() if line.startswith('yaw rate  imu'))
+    assert 'm/rad' not in gyro
