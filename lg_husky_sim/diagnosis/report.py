@@ -177,6 +177,8 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str], *,
     """
     robot: list[str] = []
     simulator: list[str] = []
+    instead: list[str] = []
+    others = 0
     for finding in diagnosis.findings:
         if finding.effect == 'unknown' and not diagnosis.fits:
             robot.append('Check that the wheels are on the ground, that their rates are in rad/s, '
@@ -194,6 +196,9 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str], *,
         kind = catalogue().get(finding.effect)
         if kind is not None:
             simulator += filled(kind.advice.simulator, values)
+            settings = filled(kind.advice.instead, values)
+            others += not settings
+            instead += settings
         robot += _for_a_change(finding, values) if changed else (
             filled(kind.advice.robot, values) if kind is not None else ())
     for group in diagnosis.indistinguishable:
@@ -204,10 +209,20 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str], *,
                          f'{names}. '
                          f'These would: {tell}.')
     if diagnosis.fits or diagnosis.model != diagnosis.plain_model:
-        simulator.append(f'Load the {_which(diagnosis)}: `ros2 run lg_husky_sim sim_node '
-                         '--ros-args -p model:=model.yaml`.')
+        simulator.append(_loading(diagnosis, instead, others))
     parts = (('On the robot', robot), ('In the simulator', simulator))
     return tuple(Advice(where, tuple(lines)) for where, lines in parts if lines)
+
+
+def _loading(diagnosis: Diagnosis, instead: Sequence[str], others: int) -> str:
+    # Parameters of sim_node that do what the model does are no second step, and not all of it.
+    load = (f'the {_which(diagnosis)}: `ros2 run lg_husky_sim sim_node --ros-args -p '
+            'model:=model.yaml`')
+    if not instead:
+        return f'Load {load}.'
+    lacking = ' The latter lacks what else was found.' * bool(others)
+    return (f'Either load {load}. Or load `plain.yaml` and set {" and ".join(instead)} in '
+            f'sim_node; not both, or the effect acts twice.{lacking}')
 
 
 def _for_a_change(finding: Finding, values: Mapping[str, float | str]) -> tuple[str, ...]:

@@ -154,10 +154,13 @@ class Remedy:
     ----------
     robot, simulator : tuple of str
         Sentences; names of parameters, and side, where, wheels, stream, stand in braces.
+    instead : tuple of str
+        Parameters of sim_node to set in place of loading the model with the effect.
     """
 
     robot: tuple[str, ...] = ()
     simulator: tuple[str, ...] = ()
+    instead: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -340,7 +343,7 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
         bool(entry.get('tried', True)), tuple(entry.get('sensors', ())),
         tuple(entry.get('manoeuvres', ())),
         Remedy(*(tuple(entry.get('advice', {}).get(place, ())) for place in (
-            'robot', 'simulator'))), str(entry.get('name', name.replace('_', ' '))))
+            'robot', 'simulator', 'instead'))), str(entry.get('name', name.replace('_', ' '))))
 
 
 @cache

@@ -158,8 +158,28 @@ def test_a_robot_that_is_no_husky_is_given_no_model_to_load() -> None:
 def test_a_limit_on_the_speed_says_nothing_of_the_yaw_rate() -> None:
     limit = _finding('command_limit', 'none', Estimate('limit_forward', 0.45, 'm/s', 0.44, 0.46))
     _, simulator = advice(_diagnosis(Verdict.KNOWN, limit), {})
-    assert simulator.sentences[0] == 'Set `max_forward: 0.45` [m/s] in sim_node.'
-    assert not any('max_yaw' in line for line in simulator.sentences)
+    (line,) = simulator.sentences
+    assert '`max_forward: 0.45` [m/s] in sim_node' in line
+    assert 'max_yaw' not in line
+
+
+def test_settings_that_do_what_the_model_does_are_said_as_the_other_way() -> None:
+    slew = _finding('command_slew', 'none', Estimate('slew_forward', 1.44, 'm/s²', 1.4, 1.5),
+                    Estimate('slew_yaw', 3.0, 'rad/s²', 2.9, 3.1))
+    model = load_model()
+
+    def said(*findings: Finding) -> tuple[str, ...]:
+        # with the finding in its model
+        return advice(replace(_diagnosis(Verdict.KNOWN, *findings),
+                              model=replace(model, about='found')), {})[-1].sentences
+    line = said(slew)[-1]
+    assert line.startswith('Either load the model with the finding: `ros2 run')
+    assert line.endswith('acts twice.')
+    assert ('Or load `plain.yaml` and set `max_forward_acceleration: 1.44` [m/s²] and '
+            '`max_yaw_acceleration: 3` [rad/s²] in sim_node; not both') in line
+    assert sum('max_forward_acceleration' in one for one in said(slew)) == 1
+    assert said(slew, RIPPLE)[-1].endswith('The latter lacks what else was found.')
+    assert said(RIPPLE)[-1].startswith('Load the model with the finding: ')
 
 
 @pytest.mark.parametrize(('effect', 'shape', 'number', 'robot', 'simulator'), [

@@ -385,6 +385,6 @@ def test_every_effect_says_what_to_do_with_its_own_numbers(name: str) -> None:
     assert kind.advice.robot
     known = {p.name for p in kind.parameters} | {
         'side', 'where', 'wheels', 'stream', 'offset', 'amplitude', 'phase'}
-    for sentence in (*kind.advice.robot, *kind.advice.simulator):
+    for sentence in (*kind.advice.robot, *kind.advice.simulator, *kind.advice.instead):
         assert {part[1] for part in Formatter().parse(sentence) if part[1]} <= known
         assert sentence.count('`') % 2 == 0
