@@ -90,6 +90,44 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     return evidence.fit(wider, slopes, rounds=3, renew=[len(wider.unknowns) - 1])
 
 
+def as_late(evidence: Evidence, point: Point, name: str, more: float) -> list[Point]:
+    """
+    Return how a log may have been made whose stream is later than a point has it.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    point : Point
+    name : str
+        Of the delay of a stream.
+    more : float
+        How much later [s].
+
+    Returns
+    -------
+    list of Point
+        One for each place of the stamps in the windows of the rates, as long as they are, where
+        the stamps need not be off by more than they may be.
+    """
+    now, period = point.log, _imu_period(evidence)
+    lag_of: Callable[[Reading], float] = {
+        'delay_wheels': wheel_lag, 'delay_imu': lambda one: imu_lag(one, period)}.get(
+            name, lambda one: 0.0)
+    others = [replace(now, wheels=kind) for kind in WheelReading] if name == 'delay_wheels' else [
+        replace(now, imu=place) for place in (0.0, 0.5, 1.0)] if (
+            name == 'delay_imu' and now.imu is not None) else []
+    found = []
+    for other in others:
+        for k, unknown in enumerate(point.unknowns):
+            delay = point.places[k] + more + lag_of(now) - lag_of(other)
+            if unknown.name == name and unknown.lower < delay < unknown.upper:
+                places = point.places.copy()
+                places[k] = delay
+                found.append(replace(point, reading=replace(
+                    point.reading, wheels=other.wheels, imu=other.imu), places=places))
+    return found
+
+
 def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
     # What a fit would cost after one step from a point, with the derivatives of this one.
     def promise(point: Point) -> float:

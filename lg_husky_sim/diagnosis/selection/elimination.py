@@ -12,6 +12,7 @@ from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
+from lg_husky_sim.diagnosis.selection.conventions import as_late
 from lg_husky_sim.errors import LgHuskyError
 import numpy as np
 
@@ -45,8 +46,7 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
         tried = []
         for one in kept:
             try:
-                fit = evidence.fit(with_effects(plain, final.point,
-                                                [h for h in kept if h is not one]))
+                fit = _without(evidence, plain, final.point, one, kept)
             except LgHuskyError:
                 # The others do not go without it.
                 continue
@@ -64,6 +64,16 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
         final = fit
         kept = [h for h in kept if h is not one]
     return final, kept
+
+
+def _without(evidence: Evidence, plain: Point, final: Point, one: Hypothesis,
+             kept: Sequence[Hypothesis]) -> Fit:
+    # Where the effect is a delay of a stream, the stamps may stand elsewhere in its windows.
+    point = with_effects(plain, final, [h for h in kept if h is not one])
+    points = [point, *(other for p in one.free if p.name in final.delays
+                       for other in as_late(evidence, point, final.delays[p.name],
+                                            final.values[p.name]))]
+    return min(map(evidence.fit, points), key=lambda fit: fit.cost)
 
 
 def with_effects(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Point:

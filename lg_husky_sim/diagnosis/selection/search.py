@@ -383,7 +383,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
             postponed = False
-    if len(found) > 1 or (found and base.point.reading != rounds[0].base.point.reading):
+    if len(found) > 1 or base.point.delays or (
+            found and base.point.reading != rounds[0].base.point.reading):
         base, kept = eliminated(evidence, plain.point, base, found, first)
         rounds = _without_the_dropped(rounds, found, kept)
         found = kept
