@@ -230,7 +230,9 @@ def _manoeuvres() -> list[str]:
 
 
 def _nuisances() -> list[str]:
-    return ['latency', 'delay_wheels', 'delay_imu', 'delay_pose', 'gyro_bias', 'initial_state']
+    from lg_husky_sim.identification.start_states import INITIAL_STATE
+    from lg_husky_sim.identification.unknowns import NUISANCES as KNOWN
+    return [*KNOWN, INITIAL_STATE]
 
 
 def _roles() -> list[str]:

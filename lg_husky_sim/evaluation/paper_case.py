@@ -14,6 +14,7 @@ from lg_husky_sim.comparison.rival import rival_prediction
 from lg_husky_sim.diagnosis.prediction_errors import assess, Assessment
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.evaluation.cases import Case
+from lg_husky_sim.evaluation.settings import extensions
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile, packaged
 from lg_husky_sim.husky.plant import Plant
@@ -28,8 +29,6 @@ SQUARES = 'LG, least squares'
 BASE = 'LG and base, least squares'
 NOMINAL = "LG, paper's numbers"
 GIVEN = 'LG, given numbers'
-#: What a base with a speed loop does to a command; the paper's model has none of it.
-BASE_EFFECTS = ('speed_loop', 'command_latency')
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +122,7 @@ def evaluate_case(case: Case, model: ModelFile, seed: int, starts: int = STARTS,
     fits = {label: estimate(model, [parts[names[0]]], method=method, seed=seed, starts=starts,
                             jobs=jobs, progress=tell)
             for label, method in ((GENETIC, Method.GENETIC), (SQUARES, Method.LEAST_SQUARES))}
-    extended = with_effects(model, BASE_EFFECTS)
+    extended = with_effects(model, extensions()['manoeuvres'].effects)
     fits[BASE] = estimate(extended, [parts[names[0]]], baseline=model, seed=seed, starts=starts,
                           jobs=jobs, progress=tell)
     plants = {label: compile_model(fit.model.structure).at(fit.model.parameters)

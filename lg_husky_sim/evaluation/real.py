@@ -19,6 +19,7 @@ from lg_husky_sim.evaluation.baselines import (
     lag_predictor,
     Predictor,
 )
+from lg_husky_sim.evaluation.settings import extensions
 from lg_husky_sim.evaluation.steps import alternate_steps, steps_of
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile, packaged
@@ -34,11 +35,6 @@ from lg_husky_sim.signals import FloatArray
 import numpy as np
 from numpy.typing import NDArray
 
-#: What a real base does with a command before the paper's model begins.
-EFFECTS = ('speed_loop', 'command_latency', 'command_slew', 'command_limit:yaw')
-#: Parameters estimated with them; the loop follows without error, which these data allow.
-FREE = ('wheel_damping', 'yaw_damping', 'command_gain', 'turn_ratio', 'loop_lag', 'latency',
-        'slew_forward', 'slew_yaw', 'limit_yaw')
 #: Least number of steps of a recording that is divided.
 FEWEST = 4
 #: The forward speed is also judged by its average over this time [s].
@@ -85,7 +81,7 @@ class StepsResult:
 
 
 def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts: int = 6,
-                   jobs: int = 1, effects: Sequence[str] = EFFECTS,
+                   jobs: int = 1, effects: Sequence[str] | None = None,
                    tell: Callable[[str], None] | None = None) -> StepsResult:
     """
     Fit on every other step and judge on the rest.
@@ -96,8 +92,8 @@ def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts
     model : ModelFile
         With the paper's numbers, or another robot's nominal ones.
     seed, starts, jobs : int
-    effects : sequence of str
-        Added to the graph for the last model.
+    effects : sequence of str, optional
+        Added to the graph for the last model; those of ``config/evaluation.yaml`` by default.
     tell : callable, optional
 
     Returns
@@ -118,8 +114,9 @@ def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts
     fitted, held = alternate_steps(whole)
     refit = estimate(model, parts, data=fitted, seed=seed, starts=starts, jobs=jobs,
                      progress=tell)
-    extended_model = with_effects(refit.model, effects)
-    free = [name for name in FREE if name in extended_model.parameters]
+    base = extensions()['steps']
+    extended_model = with_effects(refit.model, base.effects if effects is None else effects)
+    free = [name for name in base.free if name in extended_model.parameters]
     if 'loop_gain' in extended_model.parameters:
         extended_model = ModelFile(extended_model.structure, extended_model.parameters.replacing(
             {'loop_gain': 0.0, 'loop_integral': 0.0}), extended_model.about)

@@ -89,7 +89,7 @@ def settle_of(structure: Structure, nuisance: Sequence[str]) -> float:
         commanded and done before a segment is not recorded, and a dead time, a ramp or a speed
         loop still answers to it.
     """
-    back = any(one.kind.subsystem is Subsystem.COMMAND or one.id == 'sensor_time_offset'
+    back = any(one.kind.subsystem is Subsystem.COMMAND or any(p.delays for p in one.parameters())
                for one in structure.effects)
     back = back or any(name == 'latency' or name.startswith('delay') for name in nuisance)
     return SETTLE if back or INITIAL_STATE not in nuisance else SETTLE_ESTIMATED
