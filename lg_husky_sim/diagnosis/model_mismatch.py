@@ -22,7 +22,7 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.recording import Recording, Segment
-from lg_husky_sim.reporting.words import capitalised
+from lg_husky_sim.reporting.words import capitalised, padded
 
 
 @dataclass(frozen=True)
@@ -115,9 +115,9 @@ def _said(base: CommercialBase | None, better: bool, plain: Mapping[str, float],
     if not better:
         return f' {words} was tried as one hypothesis; it does not predict better.'
     shown = ' and '.join(
-        f'{label} to {out[name]:.2g} instead of {plain[name]:.2g} {unit}'
+        f'{padded(out[name], 2)} {unit} in {label} (recalibrated {padded(plain[name], 2)})'
         for name, label, unit in (('wheel_speed_rmse', 'wheel rates', 'rad/s'),
                                   ('yaw_rate_rmse', 'yaw rates', 'rad/s'))
         if name in out and name in plain)
-    return (f' {words}, tried as one hypothesis, predicts held-out {shown}; '
+    return (f' {words} was tried as one hypothesis. Its errors on held-out data are {shown}; '
             '`model.yaml` runs like it.')

@@ -76,7 +76,7 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
                   if r.held_out_gain > 0.0]
         if diagnosis.fits or rivals:
             lines.append(f'    {evidence}competing effects: '
-                         f'{", ".join(rivals) or "none with a gain"}')
+                         f'{", ".join(rivals) or "none that predicts better"}')
     for group in diagnosis.indistinguishable:
         lines.append(f'  indistinguishable: {", ".join(group.effects)}; '
                      f'would separate them: {"; ".join((*group.sensors, *group.manoeuvres))}')

@@ -8,6 +8,8 @@ from dataclasses import replace
 import math
 
 from lg_husky_sim.diagnosis.before_after.settings import Change, settings
+from lg_husky_sim.diagnosis.commercial_base import CommercialBase
+from lg_husky_sim.diagnosis.model_mismatch import _said
 from lg_husky_sim.diagnosis.output import summary_text
 from lg_husky_sim.diagnosis.report import advice, competing, headline, implausible, report_data
 from lg_husky_sim.diagnosis.result import (
@@ -49,6 +51,18 @@ def test_a_ripple_has_amplitude_and_phase() -> None:
     assert (amplitude.low, amplitude.high) == pytest.approx((4.8, 5.2))
     assert phase.value == pytest.approx(math.atan2(-4.0, 3.0))
     assert phase.high - phase.low == pytest.approx(2 * 0.2 / 5.0)
+
+
+def test_a_finding_without_rivals_says_so_in_plain_words() -> None:
+    said = summary_text(_diagnosis(Verdict.KNOWN, RIPPLE), False)
+    assert 'competing effects: none that predicts better' in said
+
+
+def test_errors_of_a_tried_base_are_written_with_the_same_digits() -> None:
+    base = CommercialBase(load_model(), {'dead_time': 0.0, 'slew_forward': 1.0, 'slew_yaw': 2.0})
+    said = _said(base, True, {'wheel_speed_rmse': 3.21}, {'wheel_speed_rmse': 3.0})
+    assert said.endswith(' was tried as one hypothesis. Its errors on held-out data are 3.0 rad/s '
+                         'in wheel rates (recalibrated 3.2); `model.yaml` runs like it.')
 
 
 def test_each_harmonic_of_a_ripple_has_amplitude_and_phase() -> None:
