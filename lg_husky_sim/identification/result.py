@@ -14,7 +14,7 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.profile import Profile
 from lg_husky_sim.identification.settings import least_noise, setting
 from lg_husky_sim.identification.start_states import HEAD, StartState, summary
-from lg_husky_sim.reporting.words import change, plural, quantity
+from lg_husky_sim.reporting.words import change, digits_apart, plural, quantity
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -187,9 +187,10 @@ class FitResult:
         lines.append(f'{"parameter":<{width}}  {"value":>11}  {"95 % interval":>25}  '
                      f'{"before":>11}  unit')
         for one in self.estimates:
-            interval = f'{one.low:.5g} to {one.high:.5g}'
+            digits = max(5, min(8, digits_apart(one.value, one.low, one.high)))
+            interval = f'{one.low:.{digits}g} to {one.high:.{digits}g}'
             note = '  (of the recording)' if one.nuisance else ''
-            lines.append(f'{one.name:<{width}}  {one.value:>11.5g}  {interval:>25}  '
+            lines.append(f'{one.name:<{width}}  {one.value:>11.{digits}g}  {interval:>25}  '
                          f'{one.start:>11.5g}  {one.unit}{note}')
         if self.start_states:
             lines += ['', *_aligned([HEAD, *summary(self.start_states)])]

@@ -104,6 +104,13 @@ def test_report_holds_every_number(fit: FitResult, truth: Truth) -> None:
     assert {p['name'] for p in data['parameters']} == set(truth)
 
 
+def test_an_interval_is_printed_with_digits_that_tell_its_ends_apart(fit: FitResult) -> None:
+    narrow = replace(fit, estimates=(replace(
+        fit.estimates[0], value=1.6, low=1.599998, high=1.600002),))
+    line = next(one for one in str(narrow).splitlines() if one.startswith('wheel_damping'))
+    assert line.split()[1:5] == ['1.6', '1.599998', 'to', '1.600002']
+
+
 def test_the_same_seed_gives_the_same_bits_whatever_the_jobs(husky: ModelFile, circle: Segment
                                                              ) -> None:
     alone = estimate(husky, [circle], seed=5, starts=2)
