@@ -228,7 +228,7 @@ def test_notebooks_and_pandas_show_tables() -> None:
     assert list(bode.to_pandas().columns) == ['gain [dB]', 'phase [deg]']
     assert fraction.to_pandas().shape == (2, 5)
     np.testing.assert_array_equal(np.asarray(step), step.values)
-    with pytest.raises(ParameterError, match=r"no output 'v\(M\)'; there are omega\(J\)"):
+    with pytest.raises(ParameterError, match=r"no output 'v\(M\)'; there is omega\(J\)"):
         step.column('v(M)')
     with pytest.raises(ValueError, match='read-only'):
         step.values[0] = 1.0
