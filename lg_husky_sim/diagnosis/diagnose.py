@@ -23,6 +23,7 @@ from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.held_out import errors, held_out_errors
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort
 from lg_husky_sim.diagnosis.localisation import mismatches, Missing, missing_efforts
 from lg_husky_sim.diagnosis.log_notes import log_notes, reading_notes
@@ -208,14 +209,16 @@ def _remaining(found: Search, rest: Sequence[Effort]) -> str:
                     f'a log evidence of {first.evidence:.1f} nats')
     last = found.rounds[-1]
     if last.tried and not (found.found and last is found.rounds[len(found.found) - 1]):
-        text.append(_refused(last))
+        text.append(_refused(last, found.found))
     return '; '.join(text) or 'nothing beyond noise'
 
 
-def _refused(last: Round) -> str:
+def _refused(last: Round, found: Sequence[Hypothesis]) -> str:
     # Why the best effect that was looked at last is no finding.
     best = last.tried[0]
-    gain = f'the best further effect, {best.hypothesis.effect.id}, gains {best.gain:.1f} nats, '
+    name = best.hypothesis.effect.id
+    again = 'one more ' if name in {one.effect.id for one in found} else ''
+    gain = f'the best further effect, {again}{name}, gains {best.gain:.1f} nats, '
     if last.chance > setting('false_alarm_rate'):
         return gain + ('as chance alone gives it' if last.chance > 0.5 else
                        f'which chance gives with a probability of {last.chance:.2g}')

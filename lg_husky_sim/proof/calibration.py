@@ -47,7 +47,7 @@ def _row(verdict: str, features: Json) -> list[float]:
     """Return what multiplies the coefficients of an answer."""
     if verdict in ('nothing_missing', 'unchanged', 'changed'):
         return [1.0, math.log10(max(float(features['chance']), 1e-12))]
-    share = math.log(max(float(features['share']), 1e-3))
+    share = math.log(min(max(float(features['share']), 1e-3), 10.0))
     if verdict == 'unknown':
         return [1.0, share]
     return [1.0, share, math.log10(max(float(features['gain']), 1.0))]

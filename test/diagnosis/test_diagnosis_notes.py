@@ -52,7 +52,8 @@ def test_errors_of_rates_that_grow_behind_a_low_pass_are_explained(
                           (0.25, 'which chance gives with a probability of 0.25'),
                           (1e-9, 'more than chance gives, but too little')):
         last = Round(evidence, fit, tried, False, chance)  # type: ignore[arg-type]
-        assert f'{name}, gains 12.0 nats, {words}' in _refused(last)
+        assert f'effect, {name}, gains 12.0 nats, {words}' in _refused(last, ())
+        assert f'effect, one more {name}, gains' in _refused(last, found.found)
 
 
 def test_a_robot_that_is_not_driven_is_refused(drive: Callable[..., Recording]) -> None:

@@ -63,11 +63,13 @@ def informs(verdict: Verdict, features: Features) -> tuple[float, ...]:
     Returns
     -------
     tuple of float
-        Bounded: what is below the least share, chance, or gain, is told apart by nobody.
+        Bounded: what is below the least share, chance, or gain, or above the largest share, is
+        told apart by nobody.
     """
     if verdict is Verdict.NOTHING_MISSING:
         return (math.log10(max(features.chance, setting('least_chance'))),)
-    share = math.log(max(features.share, setting('least_told_share')))
+    share = math.log(min(max(features.share, setting('least_told_share')),
+                         setting('most_told_share')))
     if verdict is Verdict.UNKNOWN:
         return (share,)
     return share, math.log10(max(features.gain, setting('least_told_gain')))
