@@ -8,7 +8,14 @@ from collections.abc import Mapping, Sequence
 
 from lg_husky_sim.diagnosis.before_after.settings import settings as before_after
 from lg_husky_sim.diagnosis.result import Diagnosis, Estimate, Finding, Verdict
-from lg_husky_sim.diagnosis.wording import LATENESS, lateness_words, PHASE, sized, what_to_check
+from lg_husky_sim.diagnosis.wording import (
+    LATENESS,
+    lateness_words,
+    number_words,
+    PHASE,
+    sized,
+    what_to_check,
+)
 from lg_husky_sim.husky.effects import catalogue, effect_kind, Onset, OnsetKind
 from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.data import (
@@ -72,7 +79,7 @@ def label_of(name: str, *, changed: bool = False) -> str:
         for one in before_after().quantities:
             if one.name == name:
                 return one.meaning
-    return name.replace('_', ' ')
+    return number_words(name)
 
 
 def _acts(finding: Finding, changed: bool) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import math
 
 from lg_husky_sim.diagnosis.result import Estimate, Finding
-from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind, Subsystem
+from lg_husky_sim.husky.effects import catalogue, Effect, LATER, Onset, OnsetKind, Subsystem
 from lg_husky_sim.reporting.words import with_interval
 
 _STREAMS = {'wheels': 'of the wheels (joint states)', 'imu': 'of the IMU',
@@ -81,11 +81,18 @@ def _polar(cosine: Estimate, sine: Estimate, words: str) -> tuple[Estimate, Esti
             Estimate(f'{PHASE}{words}', angle, 'rad', angle - turn, angle + turn))
 
 
+def number_words(name: str) -> str:
+    """Return what sentences call a number of an effect, or any other one."""
+    labels = (one.label for kind in catalogue().values() for one in kind.parameters
+              if one.name == name.removesuffix(LATER))
+    return next(labels, '') or name.replace('_', ' ')
+
+
 def in_words(numbers: Sequence[Estimate]) -> str:
     """Return estimates as text with their intervals."""
     return ', '.join(
         lateness_words(e) if e.name == LATENESS else
-        f'{e.name.replace("_", " ")} {with_interval(e.value, e.low, e.high, e.unit)}'
+        f'{number_words(e.name)} {with_interval(e.value, e.low, e.high, e.unit)}'
         for e in sized(numbers))
 
 
@@ -113,7 +120,7 @@ def sentence(effect: Effect, onset: Onset | None, numbers: Sequence[Estimate], r
     text = (f'{"changed: " if changed else ""}{effect_words(effect)}'
             f'{onset_words(onset)}{words}. It shows {mainly}{regime}.')
     if undetermined:
-        names = ' and '.join(name.replace('_', ' ') for name in undetermined)
+        names = ' and '.join(map(number_words, undetermined))
         text += f' These recordings do not determine {names}.'
     return text[0].upper() + text[1:]
 

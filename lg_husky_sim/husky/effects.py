@@ -113,6 +113,8 @@ class EffectParameter:
     limits : str
         What it is the largest size of: 'voltage' or 'current' of a motor, or the commanded
         'forward' speed or 'yaw' rate; empty for no limit.
+    label : str
+        What sentences call it; its name in words if empty.
     """
 
     name: str
@@ -129,6 +131,7 @@ class EffectParameter:
     jitter: Mapping[str, str] = field(default_factory=dict)
     delays: Mapping[str, str] = field(default_factory=dict)
     limits: str = ''
+    label: str = ''
 
     def of(self, robot: RobotSize) -> EffectParameter:
         """Return it for a robot of another size: bounds and sizes are in proportion."""
@@ -331,7 +334,8 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
                         bool(p.get('fixed', False)), float(p.get('negligible', 0.0)),
                         float(p.get('none_from', math.inf)), tuple(p.get('shapes', ())),
                         bool(p.get('linear', False)), dict(p.get('jitter', {})),
-                        dict(p.get('delays', {})), str(p.get('limits', '')))
+                        dict(p.get('delays', {})), str(p.get('limits', '')),
+                        str(p.get('label', '')))
         for key, p in entry['parameters'].items())
     return EffectKind(
         name, Subsystem(entry['subsystem']), str(entry['title']), tuple(entry['elements']),

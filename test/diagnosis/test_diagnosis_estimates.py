@@ -60,7 +60,7 @@ def test_a_number_whose_interval_is_its_search_is_not_reported(limited: tuple[Ev
     assert undetermined(fit, NAMES) == ('limit_forward',)
     said = sentence(LIMITS, None, (yaw,), 'while turning',
                     undetermined=undetermined(fit, NAMES))
-    assert said.endswith('These recordings do not determine limit forward.')
+    assert said.endswith('These recordings do not determine forward speed.')
     assert '0.9' not in said
 
 
@@ -125,4 +125,4 @@ def test_other_errors_than_ours_are_not_hidden(limited: tuple[Evidence, Fit]) ->
 def test_a_finding_without_a_number_is_a_sentence() -> None:
     assert sentence(LIMITS, None, (), 'everywhere', undetermined=NAMES) == (
         'The base limits the commanded speed or yaw rate. It shows everywhere. '
-        'These recordings do not determine limit forward and limit yaw.')
+        'These recordings do not determine forward speed and yaw rate.')

@@ -20,7 +20,7 @@ from lg_husky_sim.diagnosis.result import (
     Rivalry,
     Verdict,
 )
-from lg_husky_sim.diagnosis.wording import sentence, sized
+from lg_husky_sim.diagnosis.wording import number_words, sentence, sized
 from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.reporting.advice import names_in
@@ -265,3 +265,14 @@ def test_reports_call_effects_and_numbers_by_names_of_the_field() -> None:
         'dry friction of the left drivetrain 6.43 N·m (5.74 to 7.13)')
     moved = headline(_diagnosis(Verdict.KNOWN, _finding('com_shift', 'both')), changed=True)
     assert moved.text == 'What changed: shift of the centre of mass'
+
+
+def test_sentences_call_numbers_by_their_labels() -> None:
+    limit = _finding('command_limit', 'none', Estimate('limit_yaw', 0.99, 'rad/s', 0.98, 1.0))
+    assert 'yaw rate 0.99 rad/s' in sentence(Effect('command_limit', shape='yaw'), None,
+                                             limit.parameters, 'everywhere')
+    facts = dict(headline(_diagnosis(Verdict.KNOWN, limit)).facts)
+    assert facts['Effect'] == 'limit of the commanded speed or yaw rate'
+    assert facts['Size'].startswith('yaw rate 0.99 rad/s')
+    assert number_words('latency_later') == 'dead time'
+    assert number_words('wheel_damping') == 'wheel damping'
