@@ -42,11 +42,13 @@ from lg_husky_sim.diagnosis.sensors.repair import (
 )
 from lg_husky_sim.diagnosis.sensors.robot import differences, impossible
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter
 from lg_husky_sim.recording import named_apart, Recording, Segment, segments
 from lg_husky_sim.threads import threads
+import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +100,14 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     Raises
     ------
     RecordingError
-        If any recording cannot be used, or one is given twice.
+        If any recording cannot be used, one is given twice, or the robot is never driven.
     """
     nominal = nominal.in_proportion()
     recordings, _ = named_apart(recordings, ())
     drives = drives_of(recordings)
+    if not any(np.any(d.logged.values) for d in drives):
+        raise RecordingError(f'{", ".join(r.name for r in recordings)}: all commands are zero; a '
+                             'robot that is not driven shows nothing of its physics')
     names = [r.name for r in recordings]
     parts = tuple(s for r in recordings for s in segments(r))
     progress('comparing the sensors', 0.01)

@@ -351,7 +351,7 @@ def drives_of(recordings: Sequence[Recording]) -> tuple[Drive, ...]:
     Raises
     ------
     RecordingError
-        If one has no commands, or nothing that can be compared with a simulation, or none drives.
+        If one has no commands, or nothing that can be compared with a simulation.
     """
     found = []
     for recording in recordings:
@@ -365,7 +365,4 @@ def drives_of(recordings: Sequence[Recording]) -> tuple[Drive, ...]:
                 f'recording {recording.name} has no stretch of {setting("shortest_segment"):g} s '
                 'in which commands and wheels, gyro or pose were all recorded')
         found += own
-    if not any(np.any(d.logged.values) for d in found):
-        raise RecordingError(f'{", ".join(r.name for r in recordings)}: all commands are zero; a '
-                             'robot that is not driven shows nothing of its physics')
     return tuple(found)
