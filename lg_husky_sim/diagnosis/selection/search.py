@@ -263,11 +263,12 @@ def at_ticks(known: Recalibrated, start: Point, progress: Progress) -> Recalibra
                         places=np.append(point.places, start_of(own)))
         return evidence_of(drives, evidence.names, wider, evidence.noise, evidence.pool), wider
     # From where delays have not taken their place.
-    afresh = [calibrated(*ticked(known.first, start, drives), 1) for drives in rivals]
-    costs = [evidence.surprise(fit) for evidence, fit in afresh]
-    best = costs.index(min(costs))
-    drives = rivals[best]
-    if not ticks_are_likelier((known.evidence, known.base), afresh[best], drives):
+    afresh = [(evidence, evidence.fit(point)) for evidence, point in (
+        ticked(known.first, start, drives) for drives in rivals)]
+    best = min(range(len(afresh)), key=lambda k: afresh[k][1].cost)
+    evidence, drives = afresh[best][0], rivals[best]
+    near = calibrated(evidence, afresh[best][1].point, 1)
+    if not ticks_are_likelier((known.evidence, known.base), near, drives):
         return None
     other = recalibrated(*ticked(known.first, start, drives))
     # What is distorted with them, too, lacks something else, which they may be a part of.
