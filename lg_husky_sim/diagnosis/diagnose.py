@@ -29,7 +29,7 @@ from lg_husky_sim.diagnosis.localisation import mismatches, Missing, missing_eff
 from lg_husky_sim.diagnosis.log_notes import log_notes, reading_notes
 from lg_husky_sim.diagnosis.model_mismatch import model_mismatch, ModelMismatch, unsearched
 from lg_husky_sim.diagnosis.nameless import described, left_over, remaining, unknown_finding
-from lg_husky_sim.diagnosis.result import Diagnosis, Rivalry, Verdict
+from lg_husky_sim.diagnosis.result import Diagnosis, grown, Rivalry, Verdict
 from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
@@ -42,13 +42,11 @@ from lg_husky_sim.diagnosis.sensors.repair import (
 )
 from lg_husky_sim.diagnosis.sensors.robot import differences, impossible
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter
-from lg_husky_sim.recording import named_apart, Recording, Segment, segments
+from lg_husky_sim.recording import check_driven, named_apart, Recording, Segment, segments
 from lg_husky_sim.threads import threads
-import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +103,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     nominal = nominal.in_proportion()
     recordings, _ = named_apart(recordings, ())
     drives = drives_of(recordings)
-    if not any(np.any(d.logged.values) for d in drives):
-        raise RecordingError(f'{", ".join(r.name for r in recordings)}: all commands are zero; a '
-                             'robot that is not driven shows nothing of its physics')
+    check_driven(recordings)
     names = [r.name for r in recordings]
     parts = tuple(s for r in recordings for s in segments(r))
     progress('comparing the sensors', 0.01)
@@ -242,8 +238,7 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
            ) -> tuple[str, ...]:
     notes = []
     made = reading_notes(found.evidence.drives, found.final.point.log)
-    worse = [name for name in plain if name in augmented
-             and augmented[name] > (1.0 + setting('worse')) * plain[name]] if found.found else []
+    worse = grown(plain, augmented) if found.found else []
     if any(name in worse and any(note.startswith(rates) for note in made) for name, rates in (
             ('wheel_speed_rmse', 'wheel rates'), ('yaw_rate_rmse', 'yaw rates'))):
         notes.append('held-out errors of rates that grow are those of the rates themselves, not '

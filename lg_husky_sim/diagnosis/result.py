@@ -190,12 +190,17 @@ class Diagnosis:
         """What the model with the finding predicts worse on held-out data; one or none."""
         before, after = self.held_out_plain, self.held_out_augmented
         worse = [f'{quantity_with_unit(name)} from {value:.3g} to {after[name]:.3g}'
-                 for name, value in before.items()
-                 if name in after and after[name] > (1.0 + setting('worse')) * value]
+                 for name, value in before.items() if name in grown(before, after)]
         model = 'the model with the finding' if self.fits else 'the commercial base'
         return () if not worse or self.model == self.plain_model else (
             f'on held-out data, {model} predicts worse than the recalibrated one: '
             f'{", ".join(worse)}; use plain.yaml where these matter',)
+
+
+def grown(before: Mapping[str, float], after: Mapping[str, float]) -> list[str]:
+    """Return the names of errors that grow by more than counts."""
+    return [name for name, value in before.items()
+            if name in after and after[name] > (1.0 + setting('worse')) * value]
 
 
 def _number(value: float) -> float | None:

@@ -116,7 +116,7 @@ def test_delays_of_single_steps_are_those_to_the_next_tick(made: Made) -> None:
     known = steps_of(plant, drive, Reading(values={'command_delay': 0.5 * PERIOD}), 0.02)
     assert known is not None
     assert np.corrcoef(np.mod(0.011 - known.stamps, PERIOD), known.delays)[0, 1] > 0.8
-    cost = known.fitted(np.array([PERIOD]), 0.011, 40).cost[0]
+    cost = known.clock_costs(np.array([PERIOD]), 0.011, 40).cost[0]
     assert int(np.argmin(cost)) in {37, 38, 39, 0, 1, 2, 3}
 
 

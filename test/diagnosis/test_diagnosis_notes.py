@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 
+from lg_husky_sim.diagnosis.before_after.diagnose_change import diagnose_change
 from lg_husky_sim.diagnosis.diagnose import _nearest, _notes, _refused, diagnose
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
@@ -59,10 +60,13 @@ def test_errors_of_rates_that_grow_behind_a_low_pass_are_explained(
 def test_a_robot_that_is_not_driven_is_refused(drive: Callable[..., Recording]) -> None:
     recording = drive('ahead', 'nothing', 1)
     command = recording.streams['command']
-    still = replace(recording, streams={
+    still = replace(recording, name='still', path='still', streams={
         **recording.streams, 'command': replace(command, values=0.0 * command.values)})
     with pytest.raises(RecordingError, match='all commands are zero; a robot that is not driven'):
         diagnose([still], load_model(), lambda text, share: None)
+    for later, before in (([still], [recording]), ([recording], [still])):
+        with pytest.raises(RecordingError, match='all commands are zero'):
+            diagnose_change(later, before, load_model(), lambda text, share: None)
 
 
 def test_windows_that_no_fit_has_moved_are_not_said(drive: Callable[..., Recording]) -> None:

@@ -17,6 +17,7 @@ from lg_husky_sim.diagnosis.result import (
     diagnosis_data,
     Estimate,
     Finding,
+    LEAST_CHANCE,
     Rivalry,
     Verdict,
 )
@@ -242,6 +243,8 @@ def test_what_gets_worse_on_held_out_data_is_said_first_everywhere() -> None:
     assert 'yaw rate' not in warning
     assert summary_text(worse).splitlines()[1] == f'  warning: {warning}'
     assert diagnosis_data(worse)['warnings'] == [warning]
+    certain = replace(worse, findings=(replace(RIPPLE, p_value=0.0),))
+    assert diagnosis_data(certain)['findings'][0]['evidence']['p_value'] == LEAST_CHANCE
     page = report_data(worse, ['rec'], [], [])
     assert page.headline.warnings == (f'O{warning[1:]}.',)
     assert replace(worse, held_out_augmented=worse.held_out_plain).warnings == ()

@@ -26,7 +26,7 @@ from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import ModelFile
-from lg_husky_sim.recording import named_apart, Recording, Segment, segments
+from lg_husky_sim.recording import check_driven, named_apart, Recording, Segment, segments
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.threads import threads
 import numpy as np
@@ -84,7 +84,7 @@ def diagnose_change(recordings: Sequence[Recording], baseline: Sequence[Recordin
     Raises
     ------
     RecordingError
-        If a recording cannot be used.
+        If a recording cannot be used, or the robot is never driven in one of the sets.
     """
     return change_case(recordings, baseline, nominal, progress, jobs=jobs).diagnosis
 
@@ -93,6 +93,8 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
                 nominal: ModelFile, progress: Progress, *, jobs: int = 1) -> ChangeCase:
     """Do as :func:`diagnose_change`, and return what the answer was made from as well."""
     recordings, baseline = named_apart(recordings, baseline)
+    check_driven(recordings)
+    check_driven(baseline)
     nominal = nominal.in_proportion()
     known = settings().of(nominal.structure.robot)
     before, after = _drives(baseline, known), _drives(recordings, known)

@@ -152,7 +152,7 @@ def _same_rate(known: Mapping[str, Sequence[Ticker]], periods: FloatArray,
     # all, as one base has, one phase of each.
     origins = {name: float(own[0].steps.stamps[0]) for name, own in known.items()}
     fitted = {name: functools.reduce(operator.add, [
-        one.steps.fitted(periods, origins[name], count) for one in own])
+        one.steps.clock_costs(periods, origins[name], count) for one in own])
         for name, own in known.items()}
     whole = sum(one.stiffness for one in fitted.values())
     each, found = np.arange(periods.size), []
@@ -172,7 +172,7 @@ def _same_rate(known: Mapping[str, Sequence[Ticker]], periods: FloatArray,
 
 
 @dataclass(frozen=True, eq=False)
-class Base:
+class ClockSearch:
     """
     Looks for the clock of a base: one rate in all recordings, one phase in each.
 
@@ -289,4 +289,4 @@ def ticking(evidence: Evidence, fit: Fit) -> list[list[Drive]]:
     if not tickers:
         return []
     return [[_ticked(drive, clocks[drive.recording]) if drive.recording in clocks else drive
-             for drive in plain] for clocks in Base(tickers, evidence.pool).likeliest()]
+             for drive in plain] for clocks in ClockSearch(tickers, evidence.pool).likeliest()]

@@ -63,7 +63,7 @@ class Steps:
         """The mean delay [s]."""
         return float(self.weights @ self.delays / np.sum(self.weights))
 
-    def fitted(self, periods: FloatArray, origin: float, count: int) -> Fitted:
+    def clock_costs(self, periods: FloatArray, origin: float, count: int) -> ClockCosts:
         """
         Return how well clocks of some periods and of so many phases fit, by the linear problem.
 
@@ -77,7 +77,7 @@ class Steps:
 
         Returns
         -------
-        Fitted
+        ClockCosts
         """
         one = np.ones(self.stamps.size)
         whole = self.curvature @ one
@@ -87,11 +87,11 @@ class Steps:
         late = (one @ self.slope - whole @ ticks) / stiffness
         cost = (0.5 * np.sum(ticks * (self.curvature @ ticks), axis=0) - self.slope @ ticks
                 - 0.5 * stiffness * late ** 2)
-        return Fitted(cost.reshape(phases.shape), late.reshape(phases.shape), stiffness)
+        return ClockCosts(cost.reshape(phases.shape), late.reshape(phases.shape), stiffness)
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class ClockCosts:
     """
     How well clocks fit: what they cost where commands are late by l beside, K/2 (l - late)^2 more.
 
@@ -107,12 +107,12 @@ class Fitted:
     late: FloatArray
     stiffness: float
 
-    def __add__(self, other: Fitted) -> Fitted:
+    def __add__(self, other: ClockCosts) -> ClockCosts:
         """Return how well the same clocks fit both, as late."""
         whole = self.stiffness + other.stiffness
         late = (self.stiffness * self.late + other.stiffness * other.late) / whole
         apart = self.stiffness * other.stiffness / whole * (self.late - other.late) ** 2
-        return Fitted(self.cost + other.cost + 0.5 * apart, late, whole)
+        return ClockCosts(self.cost + other.cost + 0.5 * apart, late, whole)
 
     def phases(self, late: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
         """Return the likeliest phase of each period, as late as given for it, and its cost."""
