@@ -93,11 +93,11 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
                 nominal: ModelFile, progress: Progress, *, jobs: int = 1) -> ChangeCase:
     """Do as :func:`diagnose_change`, and return what the answer was made from as well."""
     recordings, baseline = named_apart(recordings, baseline)
-    check_driven(recordings)
-    check_driven(baseline)
     nominal = nominal.in_proportion()
     known = settings().of(nominal.structure.robot)
     before, after = _drives(baseline, known), _drives(recordings, known)
+    check_driven(recordings)
+    check_driven(baseline)
     later = frozenset(drive.recording for drive in after)
     moved = None
     with threads(jobs) as pool:
