@@ -9,9 +9,7 @@ import itertools
 
 from lg_husky_sim.diagnosis.decision.adoption import (
     chance_of,
-    gain_of_laws,
     is_beyond_chance,
-    least_beside,
 )
 from lg_husky_sim.diagnosis.evidence.dispersion import accident, dispersion
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
@@ -53,24 +51,6 @@ def test_larger_gains_are_less_likely_by_chance(setup: tuple[Evidence, Point]) -
     assert all(b <= a for a, b in itertools.pairwise(chances))
     assert not is_beyond_chance(chances[0])
     assert is_beyond_chance(chances[-1])
-
-
-def test_what_a_law_is_off_by_does_not_make_sensors_or_wheels_and_body_disagree() -> None:
-    """A further effect by which these do needs a smaller part of the first gain."""
-    parts = {h.effect.id: least_beside(h, 100.0) for h in ALL}
-    assert parts['gyro_bias'] == parts['wheel_radius_mismatch'] < parts['payload']
-    assert parts['payload'] == parts['command_slew'] < 100.0
-    assert all(least_beside(h, 0.0) == 0.0 for h in ALL)
-
-
-def test_effects_beside_a_fault_of_a_sensor_need_no_part_of_its_gain() -> None:
-    """A factor or an offset has one form; what a law is off by turns the wheels."""
-    gyro, drag, slope = (next(h for h in ALL if h.effect.id == name)
-                         for name in ('gyro_bias', 'quadratic_drag', 'slope'))
-    assert gain_of_laws([gyro], [11598.0]) == 0.0
-    assert gain_of_laws([gyro, drag], [11598.0, 300.0]) == 300.0
-    assert gain_of_laws([slope, gyro], [500.0, 9000.0]) == 500.0
-    assert gain_of_laws([], []) == 0.0
 
 
 def test_more_tries_and_an_onset_make_a_gain_likelier_by_chance(

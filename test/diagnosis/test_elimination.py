@@ -42,7 +42,7 @@ def test_one_effect_is_kept_only_if_it_is_needed(
     with Threads(1) as pool:
         evidence = evidence_of(drives, [recording.name], start, first_guess(drives), pool)
         evidence, final = calibrated(evidence, point, 1)
-        fit, needed = eliminated(evidence, start, final, found, 0.0)
+        fit, needed = eliminated(evidence, start, final, found)
     assert [one.effect.id for one in needed] == kept
     assert [effect.id for effect in fit.point.structure.effects] == kept
 
@@ -70,7 +70,7 @@ def test_stamps_at_the_begin_of_a_window_are_not_early(drive: Callable[..., Reco
     with Threads(1) as pool:
         evidence = evidence_of(drives, [recording.name], start, first_guess(drives), pool)
         final = evidence.fit(late.point(start, {'stamp_delay': -window}))
-        fit, kept = eliminated(evidence, start, final, [late], 0.0)
+        fit, kept = eliminated(evidence, start, final, [late])
     assert -window - period < final.point.values['stamp_delay'] < -window + period
     assert not kept
     assert fit.point.reading.wheels is WheelReading.WINDOW_START

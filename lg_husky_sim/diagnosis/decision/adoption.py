@@ -9,10 +9,6 @@ with a probability of at most n times that of one.
 
 Innovations that are not quite white make a gain larger by chance, by their dispersion.
 
-The form of no law is exact. What that of a first effect is off by turns the wheels and moves the
-body with them: a further effect in how they move has to gain a larger part of the first gain than
-one by which two sensors, or wheels and body, disagree.
-
 The log evidence of an effort without a name is the logarithm of a Bayes factor B. Where nothing is
 missing, its mean is one, so that ``P(B >= b) <= 1 / b`` (Markov), and with n of them that are
 looked at, the largest exceeds ``n / rate`` with a probability of at most that rate.
@@ -20,13 +16,11 @@ looked at, the largest exceeds ``n / rate`` with a probability of at most that r
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import math
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.effects import Subsystem
 from scipy.special import chdtrc
 
 
@@ -58,45 +52,6 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
         count *= max(1.0, seconds / setting('onset_resolution'))
     tail = float(chdtrc(hypothesis.size, 2.0 * max(gain, 0.0) / inflation))
     return min(1.0, count * tail)
-
-
-def gain_of_laws(found: Sequence[Hypothesis], gains: Sequence[float]) -> float:
-    """
-    Return the gain of which further effects have to gain a part.
-
-    Parameters
-    ----------
-    found : sequence of Hypothesis
-        Adopted, in the order of adoption.
-    gains : sequence of float
-        Of each [nats].
-
-    Returns
-    -------
-    float
-        That of the first effect but for those of sensors, whose form is exact: 0 without one.
-    """
-    return next((gain for one, gain in zip(found, gains, strict=True)
-                 if one.effect.kind.subsystem is not Subsystem.SENSOR), 0.0)
-
-
-def least_beside(hypothesis: Hypothesis, first: float) -> float:
-    """
-    Return what an effect has to gain beside a first one.
-
-    Parameters
-    ----------
-    hypothesis : Hypothesis
-    first : float
-        Gain of the first effect [nats], see :func:`gain_of_laws`.
-
-    Returns
-    -------
-    float
-        [nats]
-    """
-    apart = hypothesis.effect.kind.subsystem in (Subsystem.SENSOR, Subsystem.TRACTION)
-    return setting('least_apart' if apart else 'least_part') * first
 
 
 def is_beyond_chance(chance: float) -> bool:

@@ -177,6 +177,30 @@ def _of(effect: Effect) -> Hypothesis:
         for i in range(max(len(p.starts) for p in free))))
 
 
+def with_effects(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Point:
+    """
+    Return a fitted point with some of its effects only, read as it is.
+
+    Parameters
+    ----------
+    plain : Point
+        The model without effects.
+    final : Point
+    kept : sequence of Hypothesis
+        Their numbers come last.
+
+    Returns
+    -------
+    Point
+    """
+    base = [place for place, unknown in enumerate(final.unknowns) if unknown.kind != 'effect']
+    point = replace(plain, reading=final.reading, places=np.array(final.places[base]),
+                    unknowns=tuple(final.unknowns[place] for place in base))
+    for one in kept:
+        point = one.point(point, {p.name: final.values[p.name] for p in one.free})
+    return point
+
+
 def labels(found: Sequence[Hypothesis]) -> list[str]:
     """Return the short names of hypotheses."""
     return [h.label for h in found]

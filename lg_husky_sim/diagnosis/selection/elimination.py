@@ -5,20 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance, least_beside
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
 from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, with_effects
 from lg_husky_sim.diagnosis.selection.conventions import as_late
+from lg_husky_sim.diagnosis.selection.laws import Laws
 from lg_husky_sim.errors import LgHuskyError
-import numpy as np
 
 
-def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hypothesis],
-               first: float) -> tuple[Fit, list[Hypothesis]]:
+def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hypothesis]
+               ) -> tuple[Fit, list[Hypothesis]]:
     """
     Drop adopted effects without which the others explain as much, as the log is read now.
 
@@ -31,8 +30,6 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
         With all of them.
     found : sequence of Hypothesis
         In the order of adoption.
-    first : float
-        Gain of the first effect [nats].
 
     Returns
     -------
@@ -57,9 +54,11 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
         own = [place for place, unknown in enumerate(final.point.unknowns)
                if unknown.name in {p.name for p in one.free}]
         # One of several is weighed beside the others; the last one was chosen among all.
-        chance = chance_of(loss, one, 1 if len(kept) > 1 else every, evidence, dispersion(
+        others = Laws(plain, [h for h in kept if h is not one])
+        part, = others.parts_left(evidence, fit, [final])
+        chance = chance_of(part * loss, one, 1 if len(kept) > 1 else every, evidence, dispersion(
             evidence, final.whitened, final.jacobian[:, own]))
-        if loss >= least_beside(one, first) and is_beyond_chance(chance):
+        if is_beyond_chance(chance):
             break
         final = fit
         kept = [h for h in kept if h is not one]
@@ -74,27 +73,3 @@ def _without(evidence: Evidence, plain: Point, final: Point, one: Hypothesis,
                        for other in as_late(evidence, point, final.delays[p.name],
                                             final.values[p.name]))]
     return min(map(evidence.fit, points), key=lambda fit: fit.cost)
-
-
-def with_effects(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Point:
-    """
-    Return a fitted point with some of its effects only, read as it is.
-
-    Parameters
-    ----------
-    plain : Point
-        The model without effects.
-    final : Point
-    kept : sequence of Hypothesis
-        Their numbers come last.
-
-    Returns
-    -------
-    Point
-    """
-    base = [place for place, unknown in enumerate(final.unknowns) if unknown.kind != 'effect']
-    point = replace(plain, reading=final.reading, places=np.array(final.places[base]),
-                    unknowns=tuple(final.unknowns[place] for place in base))
-    for one in kept:
-        point = one.point(point, {p.name: final.values[p.name] for p in one.free})
-    return point

@@ -14,12 +14,13 @@ from dataclasses import dataclass, field, replace
 import itertools
 import math
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance, least_beside
+from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
 from lg_husky_sim.diagnosis.evidence.dispersion import accident, dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, neutral_of, Numbers
+from lg_husky_sim.diagnosis.selection.laws import Laws
 from lg_husky_sim.diagnosis.selection.narrowing import narrowed
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted
 from lg_husky_sim.diagnosis.selection.onsets import onset_looks, refined
@@ -178,7 +179,7 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
 
 
 def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
-                 nominal: Point | None, first: float = 0.0,
+                 nominal: Point | None, laws: Laws | None = None,
                  seeds: Sequence[Tried] = ()) -> Round:
     """
     Look at hypotheses, fit the best of them and compare them under one noise.
@@ -191,8 +192,8 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     pool : sequence of Hypothesis
     nominal : Point, optional
         Another point of the base's structure to begin from: the nominal one.
-    first : float
-        Gain of the first effect of the search [nats], of which others need a part.
+    laws : Laws, optional
+        Of what was found before; none if not given.
     seeds : sequence of Tried
         What was found on another way than from the base.
 
@@ -209,8 +210,6 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     if chance > setting('hopeless'):
         return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     own = evidence.renoised(tried[0].fit)
-    if not _may_be_adopted(evidence, base, tried, own, first):
-        return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     for number in range(2):
         best = tried[0]
         evidence = own if number == 0 else evidence.renoised(best.fit)
@@ -226,25 +225,14 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     tried = [_best_form(evidence, base, t) for t in tried[:2]] + tried[2:]
-    tried.sort(key=lambda t: (t.gain < least_beside(t.hypothesis, first),
-                              is_negligible(t, evidence.noise.values),
-                              _once(evidence, base, t) - t.score))
+    lost = dict(zip(tried, _lost(evidence, base, tried, laws), strict=True))
+    tried.sort(key=lambda t: (is_negligible(t, evidence.noise.values),
+                              lost[t] - t.score))
     tried = _from_the_start(evidence, base, tried)
     best = tried[0]
     chance = 1.0 if is_negligible(best, evidence.noise.values) else _chance(
-        evidence, best, starts, _once(evidence, base, best))
+        evidence, best, starts, _lost(evidence, base, [best], laws)[0])
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
-
-
-def _may_be_adopted(evidence: Evidence, base: Fit, tried: Sequence[Tried], own: Evidence,
-                    first: float) -> bool:
-    # Whether any gains what it needs beside a first effect once the rest is fitted with it; or
-    # the best does with noise of its own, which may have taken the place of what is missing.
-    if any(t.gain >= setting('rough_share') * least_beside(t.hypothesis, first) for t in tried):
-        return True
-    best = tried[0]
-    gain = evidence.surprise(base) - own.surprise_at(with_jitter(best.fit.point, own))
-    return gain >= least_beside(best.hypothesis, first)
 
 
 def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:
@@ -270,8 +258,13 @@ def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[T
     return [again, *(t for t in tried[1:] if t.hypothesis.effect != again.hypothesis.effect)]
 
 
-def _once(evidence: Evidence, base: Fit, tried: Tried) -> float:
-    return accident(evidence, base.whitened, tried.fit.whitened)
+def _lost(evidence: Evidence, base: Fit, tried: Sequence[Tried], laws: Laws | None
+          ) -> list[float]:
+    # What of its gain each has by an accident, or by what the laws of others are off by.
+    parts = [1.0] * len(tried) if laws is None else laws.parts_left(
+        evidence, base, [t.fit for t in tried])
+    return [accident(evidence, base.whitened, t.fit.whitened) + (1.0 - part) * t.gain
+            for t, part in zip(tried, parts, strict=True)]
 
 
 def _chance(evidence: Evidence, tried: Tried, starts: int, once: float = 0.0) -> float:

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from lg_husky_sim.diagnosis.decision.adoption import gain_of_laws, least_beside
 from lg_husky_sim.diagnosis.evidence.base_clock import ticking
 from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
@@ -15,9 +14,15 @@ from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened, start_of, tick_unknowns
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, Numbers
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
+    hypotheses,
+    Hypothesis,
+    Numbers,
+    with_effects,
+)
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
-from lg_husky_sim.diagnosis.selection.elimination import eliminated, with_effects
+from lg_husky_sim.diagnosis.selection.elimination import eliminated
+from lg_husky_sim.diagnosis.selection.laws import Laws
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.selection.rounds import (
     attempt,
@@ -349,17 +354,16 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     plain = base
     rounds: list[Round] = []
     found: list[Hypothesis] = []
-    first = 0.0
     while len(rounds) < int(setting('most_effects')):
         number = len(rounds)
         progress(f'looking for effect {number + 1}', 0.1 + 0.25 * number)
         one = forward_step(evidence, base, hypotheses(base.point.structure),
-                           None if found else start, first, seeds)
+                           None if found else start,
+                           Laws(plain.point, found) if found else None, seeds)
         seeds = []
         best = one.tried[0] if one.tried else None
         evidence = one.evidence
-        adopted = best is not None and one.adopted and best.gain >= least_beside(
-            best.hypothesis, first)
+        adopted = best is not None and one.adopted
         if postponed and not found:
             chosen = best_reading(evidence, one.base)
             if not adopted or best is None or one.base.cost - chosen.cost >= best.gain:
@@ -379,14 +383,13 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             base = one.base
             break
         found.append(best.hypothesis)
-        first = gain_of_laws(found, [r.tried[0].gain for r in rounds])
         evidence, base = _settled(evidence, best.fit.point, known.first)
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
             postponed = False
     if len(found) > 1 or base.point.delays or (
             found and base.point.reading != rounds[0].base.point.reading):
-        base, kept = eliminated(evidence, plain.point, base, found, first)
+        base, kept = eliminated(evidence, plain.point, base, found)
         rounds = _without_the_dropped(rounds, found, kept)
         found = kept
         plain = plain if found else base

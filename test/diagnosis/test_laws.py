@@ -1,0 +1,75 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A further effect is not what the law of the one before is off by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
+from lg_husky_sim.diagnosis.selection.laws import Laws
+from lg_husky_sim.diagnosis.selection.rounds import calibrated
+from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.recording import Recording
+from lg_husky_sim.threads import Threads
+import numpy as np
+import pytest
+
+BAND = Effect('driver_deadband', 'none', 'zone')
+
+
+@pytest.mark.parametrize('exact', [False, True])
+def test_what_a_law_is_off_by_is_no_further_effect(
+        exact: bool, record: Callable[..., Recording],
+        steps: Sequence[tuple[float, float, float]]) -> None:
+    """
+    A dead band that acts more at high speeds than at low ones hides no effect that it is not.
+
+    One of a sensor is exact: what looks like a part of its own is another effect.
+    """
+    model = load_model()
+    effect, size = (Effect('gyro_scale'), {'gyro_factor': 1.1}) if exact else (
+        BAND, {'dead_voltage': 1.5})
+    plant = compile_model(model.structure.with_effect(BAND)).at(
+        model.parameters.with_entries(*entries_of(BAND, {'dead_voltage': 1.5})))
+    recording = record('ahead', plant, steps, 5)
+    imu = recording.streams['imu']
+    faster = replace(imu, values=imu.values * [1.1 if exact else 1.0, *(1.0,) * (
+        imu.values.shape[1] - 1)])
+    drives = drives_of([replace(recording, streams={**recording.streams, 'imu': faster})])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    found = next(h for h in hypotheses(model.structure) if h.effect == effect)
+    bias = next(h for h in hypotheses(model.structure) if h.effect.id == 'gyro_bias')
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        evidence, base = calibrated(evidence, found.point(start, size), 1)
+        without = evidence.residuals(evidence.predict(base.point.at(np.append(
+            base.point.places[:-1], float(exact))))) - base.whitened
+        times = evidence.whiteners[0].frame.times[evidence.whiteners[0].frame.order]
+        rates = np.interp(times, drives[0].wheel_times, np.abs(drives[0].measured[
+            :drives[0].wheel_times.size]))
+        biased = base.whitened - evidence.residuals(evidence.predict(
+            bias.point(base.point, {'gyro_bias': 0.002})))
+
+        def part(change: np.ndarray, seen: np.ndarray) -> float:
+            # Of what gains by a change, where the innovations have another one in them.
+            there: Fit = replace(base, whitened=base.whitened + seen)
+            other = replace(base, whitened=there.whitened - change)
+            return Laws(start, [found]).parts_left(evidence, there, [other])[0]
+        off = 0.1 * without * (rates / rates.max())
+        assert part(biased, biased) > 0.9
+        if exact:
+            assert part(off, off) == 1.0
+        else:
+            assert part(off, off) < 0.2
+            assert part(biased, biased + off) > 0.5
