@@ -221,10 +221,10 @@ def _refused(last: Round, found: Sequence[Hypothesis]) -> str:
     again = 'one more ' if name in {one.effect.id for one in found} else ''
     gain = f'the best further effect, {again}{name}, gains {best.gain:.1f} nats, '
     if last.chance > setting('false_alarm_rate'):
+        beside = ', or what was found may be off by' if found else ''
         return gain + ('as chance alone gives it' if last.chance > 0.5 else
-                       f'which chance gives with a probability of {last.chance:.2g}')
-    return gain + ('more than chance gives, but too little beside what was found, too small to '
-                   'matter, or at single moments only')
+                       f'which chance gives with a probability of {last.chance:.2g}') + beside
+    return gain + 'more than chance gives, but nothing as the log is read in the end'
 
 
 def _nearest(found: Search) -> str:

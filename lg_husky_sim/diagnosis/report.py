@@ -130,9 +130,10 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
                              ('Part of the robot', parts or '–'), sure),
                             sentences, tuple(warnings))
         case Verdict.KNOWN:
-            what = '; '.join(effect_words(one) for one in found)
+            several = list(dict.fromkeys(effect_words(one) for one in found))
+            what = '; '.join(several)
             noun = 'What changed' if changed else (
-                'Missing effect found' if len(found) == 1 else 'Missing effects found')
+                'Missing effect found' if len(several) == 1 else 'Missing effects found')
             facts = tuple(fact for one in found for fact in _facts(
                 one, len(found) > 1, changed))
             return Headline(f'{noun}: {what}', Tone.FOUND, (*facts, sure),

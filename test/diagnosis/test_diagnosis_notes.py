@@ -51,10 +51,11 @@ def test_errors_of_rates_that_grow_behind_a_low_pass_are_explained(
     tried = (SimpleNamespace(hypothesis=found.found[0], gain=12.0),)
     for chance, words in ((1.0, 'as chance alone gives it'),
                           (0.25, 'which chance gives with a probability of 0.25'),
-                          (1e-9, 'more than chance gives, but too little')):
+                          (1e-9, 'more than chance gives, but nothing as the log is read')):
         last = Round(evidence, fit, tried, False, chance)  # type: ignore[arg-type]
         assert f'effect, {name}, gains 12.0 nats, {words}' in _refused(last, ())
         assert f'effect, one more {name}, gains' in _refused(last, found.found)
+        assert ('what was found may be off by' in _refused(last, found.found)) == (chance > 0.02)
 
 
 def test_a_robot_that_is_not_driven_is_refused(drive: Callable[..., Recording]) -> None:
