@@ -176,15 +176,15 @@ def test_a_motor_that_brakes_less_than_it_drives_is_unknown_and_says_so(
     assert (said.subsystem, said.side) == ('drivetrain', 'left')
 
 
-def _with_pulses(evidence: Evidence, fit: Fit, moments: tuple[float, ...], length: float
-                 ) -> Search:
+def _with_pulses(evidence: Evidence, fit: Fit, moments: tuple[float, ...], length: float,
+                 torque: float = 30.0) -> Search:
     parts = []
     for whitener in evidence.whiteners:
         times = probe_times(whitener.frame.drive)
         efforts = np.zeros((times.size, 4))
         for moment in moments:
             since = times - whitener.frame.drive.start - moment
-            efforts[:, LEFT] -= np.where((since >= 0.0) & (since < length), 30.0, 0.0)
+            efforts[:, LEFT] -= np.where((since >= 0.0) & (since < length), torque, 0.0)
         parts.append(_moved(whitener, efforts))
     return _noisy(evidence, fit, np.concatenate(parts))
 
@@ -215,6 +215,16 @@ def test_what_a_late_command_can_do_and_what_happens_once_is_no_burst(
     rest = np.zeros(evidence.count - one.frame.times.size)
     once = _noisy(evidence, fit, np.concatenate([_moved(one, efforts), rest]))
     assert wheel_bursts(evidence, once.final, 'left') == 0.0
+
+
+def test_bumps_of_a_floor_are_no_bursts(fitted: tuple[Evidence, Fit]) -> None:
+    """However far beyond the noise of the wheels: they move these by next to nothing."""
+    evidence, fit = fitted
+    sharp = evidence.with_whiteners([replace(one, scale=0.05 * one.scale)
+                                     for one in evidence.whiteners])
+    bumpy = _with_pulses(sharp, fit, tuple(k * STEP + 0.85 for k in (3, 8, 14, 20)), 0.03, 3.0)
+    assert np.count_nonzero(np.abs(bumpy.final.whitened) > setting('far')) > 10
+    assert wheel_bursts(sharp, bumpy.final, 'left') == 0.0
 
 
 @pytest.mark.parametrize(('subsystem', 'side', 'regime', 'words'), [

@@ -5,10 +5,12 @@ Moments at which a wheel does what no command can have made it do: a motor that 
 
 A likelihood with Student's t takes innovations far beyond their noise for accidents, so that what
 happens for moments weighs next to nothing in it. Most such moments are accidents: a command that
-came late, or never. But no command moves a wheel by more than it changes, so that these are left
-out: neighbouring innovations of a side, the largest of which stands for a rate beyond what all
-commands of the time before it change together. The evidence of the others is what the cost loses
-without them, each less half the logarithm of the number of readings for its time and its size::
+came late, or never, or a bump of the floor. But no command moves a wheel by more than it changes,
+and no bump of a floor by more than a speed that is as good as none, so that these are left out:
+neighbouring innovations of a side count, the largest of which stands for a rate beyond that, and
+beyond what all commands of the time before it change together. Their evidence is what the cost
+loses without them, each less half the logarithm of the number of readings for its time and its
+size::
 
     sum over bursts of  sum (nu+1)/2 log(1 + e^2/nu) - log n
 """
@@ -70,7 +72,7 @@ def _gains(times: FloatArray, e: FloatArray, sizes: FloatArray, drive: Drive, le
     far = np.flatnonzero(np.abs(e) > setting('far'))
     if not far.size:
         return []
-    before = setting('burst_before')
+    before, bump = setting('burst_before'), setting('still_speed')
     stamps = drive.logged.times
     changes = np.abs(np.diff(drive.logged.values, axis=0, prepend=drive.logged.values[:1]))
     costs = student.costs(e)
@@ -78,7 +80,7 @@ def _gains(times: FloatArray, e: FloatArray, sizes: FloatArray, drive: Drive, le
     for burst in np.split(far, np.flatnonzero(np.diff(times[far]) > setting('burst_apart')) + 1):
         begin, end = times[burst[0]] - before, times[burst[-1]]
         recent = changes[(stamps > begin) & (stamps <= end)]
-        most = float(np.sum(recent[:, 0] + lever * recent[:, 1])) / radius
+        most = max(float(np.sum(recent[:, 0] + lever * recent[:, 1])), bump) / radius
         if np.max(sizes[burst]) > most:
             found.append(float(np.sum(costs[burst]) - np.max(costs[burst])))
     return found
