@@ -8,18 +8,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
-from lg_husky_sim.diagnosis.evidence.evidence import evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
-from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.point import beginning, Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
 from lg_husky_sim.diagnosis.selection.laws import Laws
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
+from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
+from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
@@ -73,3 +75,20 @@ def test_what_a_law_is_off_by_is_no_further_effect(
         else:
             assert part(off, off) < 0.2
             assert part(biased, biased + off) > 0.5
+
+
+def test_a_robot_that_runs_away_without_what_was_found_is_judged_all_the_same(
+        drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch) -> None:
+    model = load_model()
+    drives = drives_of([drive('ahead', 'nothing', 1)])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    found = next(h for h in hypotheses(model.structure) if h.effect == BAND)
+
+    def runs_away(evidence: Evidence, point: Point) -> tuple[FloatArray, ...]:
+        raise LgHuskyError('the simulation runs away')
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        base = evidence.fit(found.point(start, {'dead_voltage': 0.1}), rounds=0)
+        monkeypatch.setattr(Evidence, 'predict', runs_away)
+        assert Laws(start, [found]).parts_left(evidence, base, [base]) == [1.0]

@@ -31,6 +31,7 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, with_effect
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import quantities
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -78,7 +79,11 @@ class Laws:
         if len(exact) == len(self.found) or not others:
             return [1.0] * len(others)
         point = with_effects(self.plain, base.point, exact)
-        made = evidence.residuals(evidence.predict(point)) - base.whitened
+        try:
+            made = evidence.residuals(evidence.predict(point)) - base.whitened
+        except LgHuskyError:
+            # It runs away without them: there is nothing that they could be a part of.
+            return [1.0] * len(others)
         columns = setting('law_off') * made[:, None] * _shapes(evidence, base)
         projection = Projection(base)
         return [_part_left(projection, base.whitened - other.whitened, columns)
