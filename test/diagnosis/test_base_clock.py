@@ -18,7 +18,7 @@ from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, start_of, tick_unknowns
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.diagnosis.selection import search
+from lg_husky_sim.diagnosis.selection import recalibration
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.diagnosis.selection.ticks import ticks_are_likelier
 from lg_husky_sim.husky.model import compile_model
@@ -98,11 +98,12 @@ def test_the_period_of_a_base_is_found_from_two_drives(
     mass = next(k for k, u in enumerate(start.unknowns) if u.name == 'mass')
     places[mass] += 8.0 * start.unknowns[mass].deviation
     distorted = ticked[0].fit(ticked[1].point.at(places), rounds=0)
-    known = search.Recalibrated(evidence, plain[1], search.Logged(plain[1]), *plain)
+    known = recalibration.Recalibrated(
+        evidence, plain[1], recalibration.Logged(plain[1]), *plain)
     for base, accepted in ((ticked[1], True), (distorted, False)):
         other = replace(known, base=base)
-        monkeypatch.setattr(search, 'recalibrated', lambda *_, other=other: other)
-        assert (search.at_ticks(known, start, lambda *_: None) is other) is accepted
+        monkeypatch.setattr(recalibration, 'recalibrated', lambda *_, other=other: other)
+        assert (recalibration.at_ticks(known, start, [found]) is other) is accepted
     quiet = evidence_of(drives, ['one', 'two'], start, replace(guess, values={
         **guess.values, 'command_jitter': 1e-4}), pool)
     assert ticking(quiet, quiet.fit(start, rounds=1)) == []

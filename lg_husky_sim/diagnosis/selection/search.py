@@ -8,12 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.evidence.base_clock import ticking
-from lg_husky_sim.diagnosis.evidence.drives import Drive
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
-from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
-from lg_husky_sim.diagnosis.evidence.unknowns import loosened, start_of, tick_unknowns
+from lg_husky_sim.diagnosis.evidence.unknowns import loosened, start_of
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     hypotheses,
     Hypothesis,
@@ -24,18 +22,24 @@ from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.elimination import eliminated
 from lg_husky_sim.diagnosis.selection.laws import Laws
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
+from lg_husky_sim.diagnosis.selection.recalibration import (
+    as_logged,
+    at_ticks,
+    Logged,
+    promised,
+    promising,
+    recalibrated,
+)
 from lg_husky_sim.diagnosis.selection.rounds import (
     attempt,
     calibrated,
-    fitted,
     forward_step,
     numbers_of,
     Round,
     Tried,
     with_jitter,
 )
-from lg_husky_sim.diagnosis.selection.screening import Look, look
-from lg_husky_sim.diagnosis.selection.ticks import ticks_are_likelier
+from lg_husky_sim.diagnosis.selection.ticks import ticked, ticks_of_found
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -70,50 +74,6 @@ class Search:
     def adopted(self) -> tuple[Round, ...]:
         """The rounds whose best hypothesis was adopted."""
         return self.rounds[:len(self.found)]
-
-
-@dataclass(frozen=True, eq=False)
-class Logged:
-    """
-    A reading of the sensors, or effects that pass for one.
-
-    Parameters
-    ----------
-    fit : Fit
-        Of the base: with the likeliest reading, or with the usual one where an effect promises
-        more than the reading gains and the reading waits for what the effect really gains.
-    better : sequence of Tried
-        The effects that promise more, best first.
-    early : sequence of Tried
-        All that were fitted under the usual reading, best first.
-    """
-
-    fit: Fit
-    better: Sequence[Tried] = ()
-    early: Sequence[Tried] = ()
-
-
-def _as_logged(evidence: Evidence, base: Fit, afresh: bool = False) -> Logged:
-    chosen = best_reading(evidence, base, afresh)
-    if chosen is base:
-        return Logged(base)
-    pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
-    early = fitted(evidence, base, _promising(evidence, base, pool), [base.point], whole=False)
-    better = [t for t in early if t.gain > _promised(base, chosen)]
-    return Logged(base if better else chosen, better, early)
-
-
-def _promising(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis]) -> list[Look]:
-    # The looks at the effects that promise most, each in its best form.
-    best: dict[str, Look] = {}
-    for one in look(evidence, base, pool):
-        best.setdefault(one.hypothesis.effect.id, one)
-    return list(best.values())[:int(setting('early_effects'))]
-
-
-def _promised(base: Fit, chosen: Fit) -> float:
-    # What an effect has to gain for another reading to wait.
-    return (1.0 + setting('near_margin')) * (base.cost - chosen.cost)
 
 
 def _read_as(evidence: Evidence, base: Fit, chosen: Fit) -> tuple[Evidence, Fit]:
@@ -160,7 +120,7 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tri
         pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
         found.append(_best_start(first, rough, [
             (one.hypothesis, rough.point.places, one.numbers)
-            for one in _promising(first, rough, pool)]))
+            for one in promising(first, rough, pool)]))
     seeds = [_own(*one, base) for one in found if one is not None]
     return [max(seeds, key=lambda one: one.score)] if seeds else []
 
@@ -217,69 +177,6 @@ def _read_like(evidence: Evidence, base: Fit, seed: Tried) -> tuple[Fit, Tried]:
     return plain, Tried(seed.hypothesis, fit, plain.cost - fit.cost, evidence.count)
 
 
-@dataclass(frozen=True, eq=False)
-class Recalibrated:
-    """
-    The model as it is, with the noise and the reading of the log.
-
-    Parameters
-    ----------
-    first : Evidence
-        Under a first guess of the noise.
-    rough : Fit
-        Under it, after one step.
-    logged : Logged
-    evidence : Evidence
-        With the last noise.
-    base : Fit
-        Under that.
-    """
-
-    first: Evidence
-    rough: Fit
-    logged: Logged
-    evidence: Evidence
-    base: Fit
-
-
-def recalibrated(evidence: Evidence, start: Point) -> Recalibrated:
-    """Fit the model as it is, from where it should be."""
-    # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
-    rough = evidence.fit(start, rounds=1)
-    stamped, point = likeliest_stamps(evidence, rough)
-    if stamped is not evidence:
-        evidence, rough = stamped, stamped.fit(point, rounds=1)
-    logged = _as_logged(evidence, rough, afresh=True)
-    start = nominal_of(logged.fit.point)
-    return Recalibrated(evidence, rough, logged, *calibrated(evidence.about(start), start))
-
-
-def at_ticks(known: Recalibrated, start: Point, progress: Progress) -> Recalibrated | None:
-    """Return the same of a base that applies commands at its own ticks, if that is likelier."""
-    rivals = ticking(known.evidence, known.base)
-    if not rivals:
-        return None
-    progress('update rate of the base', 0.08)
-
-    def ticked(evidence: Evidence, point: Point,
-               drives: Sequence[Drive]) -> tuple[Evidence, Point]:
-        own = tick_unknowns(drives)
-        wider = replace(point, unknowns=(*point.unknowns, *own),
-                        places=np.append(point.places, start_of(own)))
-        return evidence_of(drives, evidence.names, wider, evidence.noise, evidence.pool), wider
-    # From where delays have not taken their place.
-    afresh = [(evidence, evidence.fit(point)) for evidence, point in (
-        ticked(known.first, start, drives) for drives in rivals)]
-    best = min(range(len(afresh)), key=lambda k: afresh[k][1].cost)
-    evidence, drives = afresh[best][0], rivals[best]
-    near = calibrated(evidence, afresh[best][1].point, 1)
-    if not ticks_are_likelier((known.evidence, known.base), near, drives):
-        return None
-    other = recalibrated(*ticked(known.first, start, drives))
-    # What is distorted with them, too, lacks something else, which they may be a part of.
-    return None if is_distorted(other.base) else other
-
-
 def _settled(evidence: Evidence, point: Point, first: Evidence) -> tuple[Evidence, Fit]:
     # The likeliest numbers and noise of an adopted structure: where they began far from the robot
     # as it should be, since the base had absorbed the effect, from there, too, and from there
@@ -331,10 +228,13 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     """
     progress('recalibration', 0.05)
     known = recalibrated(evidence, start)
-    ticked = at_ticks(known, start, progress)
-    if ticked is not None:
-        known = ticked
-    evidence, base = known.evidence, known.base
+    rivals = ticking(known.evidence, known.base)
+    if rivals:
+        progress('update rate of the base', 0.08)
+        other = at_ticks(known, start, rivals)
+        if other is not None:
+            known, rivals = other, []
+    evidence, base, first = known.evidence, known.base, known.first
     seeds = seeds_of(known.first, known.rough, base, known.logged)
     otherwise = None
     if seeds and seeds[0].fit.point.reading != base.point.reading:
@@ -344,8 +244,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             base, seeds[0] = _read_like(evidence, base, seeds[0])
         else:
             seeds = []
-    logged = Logged(base, seeds) if otherwise else _as_logged(evidence, base)
-    if seeds and seeds[0].gain > _promised(base, logged.fit):
+    logged = Logged(base, seeds) if otherwise else as_logged(evidence, base)
+    if seeds and seeds[0].gain > promised(base, logged.fit):
         logged = Logged(base, seeds)
     postponed = bool(logged.better)
     evidence, base = _read_as(evidence, base, logged.fit)
@@ -354,6 +254,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     plain = base
     rounds: list[Round] = []
     found: list[Hypothesis] = []
+    ticks = False
     while len(rounds) < int(setting('most_effects')):
         number = len(rounds)
         progress(f'looking for effect {number + 1}', 0.1 + 0.25 * number)
@@ -383,11 +284,16 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             base = one.base
             break
         found.append(best.hypothesis)
-        evidence, base = _settled(evidence, best.fit.point, known.first)
+        evidence, base = _settled(evidence, best.fit.point, first)
+        late = ticks_of_found(first, evidence, base, rivals) if rivals else None
+        if late is not None:
+            evidence, base, rivals, ticks = late.evidence, late.fit, [], True
+            first, _ = ticked(first, base.point, late.drives)
+            plain = evidence.fit(with_effects(plain.point, base.point, []))
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))
             postponed = False
-    if len(found) > 1 or base.point.delays or (
+    if len(found) > 1 or ticks or base.point.delays or (
             found and base.point.reading != rounds[0].base.point.reading):
         base, kept = eliminated(evidence, plain.point, base, found)
         rounds = _without_the_dropped(rounds, found, kept)

@@ -3,6 +3,9 @@
 """
 Whether a base applies commands at ticks of its own, once the likeliest ticks are known.
 
+What else a robot lacks may distort its numbers with and without ticks: then they are looked at
+again when that has been found.
+
 Ticks explain why some commands act later than others, not that all are late, which slow ticks of
 the right phase can mimic where a drive has few steps of the commands. So both have what all
 commands are late as free as the slowest ticks would make it, and ticks must be likelier by more
@@ -12,14 +15,97 @@ than the best of so many would be by chance.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Drive
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
+from lg_husky_sim.diagnosis.evidence.unknowns import start_of, tick_unknowns
+from lg_husky_sim.diagnosis.selection.nominal import is_distorted
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.diagnosis.settings import setting
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Ticked:
+    """
+    A model whose base applies commands at ticks.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+        With commands at these ticks.
+    evidence : Evidence
+        With the noise of the fit.
+    fit : Fit
+        Under that.
+    """
+
+    drives: Sequence[Drive]
+    evidence: Evidence
+    fit: Fit
+
+
+def ticked(evidence: Evidence, point: Point, drives: Sequence[Drive]) -> tuple[Evidence, Point]:
+    """Return evidence and a point of drives with commands at ticks of unknown phases."""
+    own = tick_unknowns(drives)
+    last = sum(u.kind == 'effect' for u in point.unknowns)
+    place = len(point.unknowns) - last
+    wider = replace(
+        point, unknowns=(*point.unknowns[:place], *own, *point.unknowns[place:]),
+        places=np.concatenate([point.places[:place], start_of(own), point.places[place:]]))
+    return evidence_of(drives, evidence.names, wider, evidence.noise, evidence.pool), wider
+
+
+def near_ticks(first: Evidence, plain: tuple[Evidence, Fit], start: Point,
+               rivals: Sequence[Sequence[Drive]]) -> Ticked | None:
+    """
+    Return a model fitted at the likeliest of some ticks, if these are likelier than none.
+
+    Parameters
+    ----------
+    first : Evidence
+        Under a first guess of the noise.
+    plain : tuple of Evidence and Fit
+        Of commands that are applied as they come.
+    start : Point
+        Where the fits begin.
+    rivals : sequence of sequence of Drive
+        With commands at ticks of one rate or another.
+    """
+    afresh = [(evidence, evidence.fit(point)) for evidence, point in (
+        ticked(first, start, drives) for drives in rivals)]
+    best = min(range(len(afresh)), key=lambda k: afresh[k][1].cost)
+    near = calibrated(afresh[best][0], afresh[best][1].point, 1)
+    if not ticks_are_likelier(plain, near, rivals[best]):
+        return None
+    return Ticked(rivals[best], *near)
+
+
+def ticks_of_found(first: Evidence, evidence: Evidence, base: Fit,
+                   rivals: Sequence[Sequence[Drive]]) -> Ticked | None:
+    """
+    Return a model with the effects that were found at ticks, if these are likelier than none.
+
+    Parameters
+    ----------
+    first : Evidence
+        Under a first guess of the noise.
+    evidence : Evidence
+    base : Fit
+        With these effects, of commands that are applied as they come.
+    rivals : sequence of sequence of Drive
+        With commands at ticks of one rate or another.
+
+    Returns
+    -------
+    Ticked or None
+        None where the robot's numbers are distorted still, too.
+    """
+    found = near_ticks(first, (evidence, base), base.point, rivals)
+    return None if found is None or is_distorted(found.fit) else found
 
 
 def ticks_are_likelier(plain: tuple[Evidence, Fit], ticked: tuple[Evidence, Fit],

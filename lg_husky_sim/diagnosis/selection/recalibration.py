@@ -1,0 +1,130 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The model as it is, fitted from where it should be, with how its log was made and its ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lg_husky_sim.diagnosis.evidence.drives import Drive
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.point import Point
+from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
+from lg_husky_sim.diagnosis.selection.conventions import best_reading
+from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
+from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted, Tried
+from lg_husky_sim.diagnosis.selection.screening import Look, look
+from lg_husky_sim.diagnosis.selection.ticks import near_ticks, ticked
+from lg_husky_sim.diagnosis.settings import setting
+
+
+@dataclass(frozen=True, eq=False)
+class Logged:
+    """
+    A reading of the sensors, or effects that pass for one.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of the base: with the likeliest reading, or with the usual one where an effect promises
+        more than the reading gains and the reading waits for what the effect really gains.
+    better : sequence of Tried
+        The effects that promise more, best first.
+    early : sequence of Tried
+        All that were fitted under the usual reading, best first.
+    """
+
+    fit: Fit
+    better: Sequence[Tried] = ()
+    early: Sequence[Tried] = ()
+
+
+def as_logged(evidence: Evidence, base: Fit, afresh: bool = False) -> Logged:
+    """Return a base with the likeliest reading, unless an effect promises more than that."""
+    chosen = best_reading(evidence, base, afresh)
+    if chosen is base:
+        return Logged(base)
+    pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
+    early = fitted(evidence, base, promising(evidence, base, pool), [base.point], whole=False)
+    better = [t for t in early if t.gain > promised(base, chosen)]
+    return Logged(base if better else chosen, better, early)
+
+
+def promising(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis]) -> list[Look]:
+    """Return the looks at the effects that promise most, each in its best form."""
+    best: dict[str, Look] = {}
+    for one in look(evidence, base, pool):
+        best.setdefault(one.hypothesis.effect.id, one)
+    return list(best.values())[:int(setting('early_effects'))]
+
+
+def promised(base: Fit, chosen: Fit) -> float:
+    """Return what an effect has to gain for another reading to wait."""
+    return (1.0 + setting('near_margin')) * (base.cost - chosen.cost)
+
+
+@dataclass(frozen=True, eq=False)
+class Recalibrated:
+    """
+    The model as it is, with the noise and the reading of the log.
+
+    Parameters
+    ----------
+    first : Evidence
+        Under a first guess of the noise.
+    rough : Fit
+        Under it, after one step.
+    logged : Logged
+    evidence : Evidence
+        With the last noise.
+    base : Fit
+        Under that.
+    """
+
+    first: Evidence
+    rough: Fit
+    logged: Logged
+    evidence: Evidence
+    base: Fit
+
+
+def recalibrated(evidence: Evidence, start: Point) -> Recalibrated:
+    """Fit the model as it is, from where it should be."""
+    # Under a wrong reading the numbers of the robot would take its place: first of all at nominal.
+    rough = evidence.fit(start, rounds=1)
+    stamped, point = likeliest_stamps(evidence, rough)
+    if stamped is not evidence:
+        evidence, rough = stamped, stamped.fit(point, rounds=1)
+    logged = as_logged(evidence, rough, afresh=True)
+    start = nominal_of(logged.fit.point)
+    return Recalibrated(evidence, rough, logged, *calibrated(evidence.about(start), start))
+
+
+def at_ticks(known: Recalibrated, start: Point, rivals: Sequence[Sequence[Drive]]
+             ) -> Recalibrated | None:
+    """
+    Return the same of a base that applies commands at its own ticks, if that is likelier.
+
+    Parameters
+    ----------
+    known : Recalibrated
+        With commands that are applied as they come.
+    start : Point
+        The nominal model.
+    rivals : sequence of sequence of Drive
+        With commands at ticks of one rate or another.
+
+    Returns
+    -------
+    Recalibrated or None
+        None where ticks are not likelier, or the robot's numbers are distorted with them, too: it
+        lacks something else then, which the ticks may be a part of.
+    """
+    # From where delays have not taken their place.
+    near = near_ticks(known.first, (known.evidence, known.base), start, rivals)
+    if near is None:
+        return None
+    other = recalibrated(*ticked(known.first, start, near.drives))
+    return None if is_distorted(other.base) else other
