@@ -15,11 +15,10 @@ from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.products import normal_matrix
 from lg_husky_sim.diagnosis.evidence.unknowns import Unknown
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import neutral_of
-from lg_husky_sim.diagnosis.hypotheses.lines import Line
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, efforts, READINGS
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import Effort, READINGS
 from lg_husky_sim.diagnosis.localisation import Missing, where_it_shows
-from lg_husky_sim.diagnosis.nameless import felt, needed_evidence
+from lg_husky_sim.diagnosis.nameless import felt, left_over, needed_evidence
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Verdict
 from lg_husky_sim.diagnosis.rivals import rivals_of
 from lg_husky_sim.diagnosis.selection.rounds import is_negligible
@@ -222,18 +221,25 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
 
 def _is_its_form(search: Search, rest: Sequence[Effort]) -> bool:
     # Whether what is left is a law of another form: at the balance, and over the quantity, where
-    # the effects explain most, and most of what there is. One that remembers or repeats is none,
-    # and the factor and the offset of a sensor have only one.
-    left = {(one.balance, one.argument): one.explained for one in rest}
+    # the effects explain most, and most of what there is. One that remembers is none, and the
+    # factor and the offset of a sensor have only one.
     most = max(rest, key=lambda one: one.explained, default=None)
-    if (most is None or most.argument in PAST or most.balance in READINGS
-            or isinstance(most, Line)):
+    if most is None or most.argument in PAST or most.balance in READINGS:
         return False
-    whole = {(one.balance, one.argument): one.explained for one in efforts(
-        search.evidence, search.evidence.fit(search.plain.point))}
+    left = _by_place(rest)
+    whole = _by_place(left_over(search.evidence, search.evidence.fit(search.plain.point)))
     best = max(whole, key=lambda place: whole[place] - left.get(place, 0.0))
     return best == (most.balance, most.argument) and (
-        whole[best] - most.explained > setting('form_share') * whole[best])
+        whole[best] - left[best] > setting('form_share') * whole[best])
+
+
+def _by_place(rest: Sequence[Effort]) -> dict[tuple[str, str], float]:
+    # What efforts explain, smooth ones and those that repeat, by balance and quantity.
+    found: dict[tuple[str, str], float] = {}
+    for one in rest:
+        place = one.balance, one.argument
+        found[place] = found.get(place, 0.0) + one.explained
+    return found
 
 
 def _sure(verdict: Verdict, features: Features) -> Answer:

@@ -15,7 +15,7 @@ _STREAMS = {'wheels': 'of the wheels (joint states)', 'imu': 'of the IMU',
             'pose': 'of the pose (tf or odometry)'}
 AMPLITUDE, PHASE = 'amplitude', 'phase'
 #: Ends of the names of a ripple's numbers, and those of its harmonics' amplitudes and phases.
-_HARMONICS = {'': '', '_twice': ' of the second harmonic'}
+_HARMONICS = {'': '', '_twice': ' of the second harmonic', '_thrice': ' of the third harmonic'}
 #: The number of an effect that says how late stamps are, or how early.
 LATENESS = 'stamp_delay'
 #: What to check on a robot, by the quantity that an effort or an error follows.

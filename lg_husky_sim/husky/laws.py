@@ -56,9 +56,9 @@ class Law(enum.IntEnum):
     HEADING = 4
     """f = p0 cos(heading) + p1 sin(heading)."""
     WHEEL_PHASE = 5
-    """f = (p0 cos(angle) + p1 sin(angle) + p4 cos(2 angle) + p5 sin(2 angle))
-    (1 - exp(-(z0/p3)^2)); p2 is 0 for the left wheel, 1 for the right: what ripples as the motor
-    turns does not drive a wheel that rests."""
+    """f = (p0 cos(angle) + p1 sin(angle) + p4 cos(2 angle) + p5 sin(2 angle) + p6 cos(3 angle)
+    + p7 sin(3 angle)) (1 - exp(-(z0/p3)^2)); p2 is 0 for the left wheel, 1 for the right: what
+    ripples as the motor turns does not drive a wheel that rests."""
     SLIP_SATURATION = 6
     """f = p0 tanh(p1 z0/p0) - p1 z0: turns damping p1 into a force that saturates at p0."""
     CURRENT_LIMIT = 7
@@ -103,7 +103,8 @@ EXPRESSIONS = {
     Law.MODULATED_DAMPING: '-p0*abs(z2)*z1',
     Law.HEADING: 'p0*cos(heading)+p1*sin(heading)',
     Law.WHEEL_PHASE: (
-        '(p0*cos(angle)+p1*sin(angle)+p4*cos(2*angle)+p5*sin(2*angle)+0*p2)'
+        '(p0*cos(angle)+p1*sin(angle)+p4*cos(2*angle)+p5*sin(2*angle)'
+        '+p6*cos(3*angle)+p7*sin(3*angle)+0*p2)'
         '*(1-exp(-(z1/p3)**2))'),
     Law.SLIP_SATURATION: 'p0*tanh(p1*z1/p0)-p1*z1',
     Law.CURRENT_LIMIT: '(abs(z1-p2*z2+p1*p0)-abs(z1-p2*z2-p1*p0))/2+p2*z2-z1',
@@ -286,9 +287,11 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
             angle = context[4 + int(p2)]
             share = z[o] / coefficients[c, j, 3]
             value = p0 * math.cos(angle) + p1 * math.sin(angle)
-            if coefficients[c, j, 4] != 0.0 or coefficients[c, j, 5] != 0.0:
-                value += (coefficients[c, j, 4] * math.cos(2.0 * angle)
-                          + coefficients[c, j, 5] * math.sin(2.0 * angle))
+            for turns in range(2, 4):
+                i = 2 * turns
+                if coefficients[c, j, i] != 0.0 or coefficients[c, j, i + 1] != 0.0:
+                    value += (coefficients[c, j, i] * math.cos(turns * angle)
+                              + coefficients[c, j, i + 1] * math.sin(turns * angle))
             out[j] = value * (1.0 - math.exp(-share * share))
         elif law == 6:
             out[j] = p0 * math.tanh(p1 * z[o] / p0) - p1 * z[o]

@@ -15,8 +15,8 @@ from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import efforts
 from lg_husky_sim.diagnosis.localisation import missing_efforts
+from lg_husky_sim.diagnosis.nameless import left_over
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, forward_step
 from lg_husky_sim.diagnosis.selection.search import Search
@@ -32,11 +32,11 @@ KNOTS = 9
 Steps = Sequence[tuple[float, float, float]]
 
 
-def _turned(first: float, third: float) -> dict[str, float]:
-    # A torque over the angle of the wheel [N·m] with a first and a third harmonic.
+def _turned(first: float, fourth: float) -> dict[str, float]:
+    # A torque over the angle of the wheel [N·m] with a first and a fourth harmonic.
     angles = [2.0 * math.pi * k / (KNOTS - 1) for k in range(KNOTS)]
     return {'range_low': 0.0, 'range_high': 2.0 * math.pi, **{
-        f'knot_{k + 1}': first * math.cos(a) + third * math.cos(3.0 * a)
+        f'knot_{k + 1}': first * math.cos(a) + fourth * math.cos(4.0 * a)
         for k, a in enumerate(angles)}}
 
 
@@ -47,7 +47,7 @@ def _headed(moment: float) -> dict[str, float]:
 
 
 @pytest.mark.parametrize(('law', 'sizes', 'verdict'), [
-    (Effect('smooth_torque', 'right', 'angle'), _turned(1.2, 0.9), Verdict.KNOWN),
+    (Effect('smooth_torque', 'right', 'angle'), _turned(1.2, 0.6), Verdict.KNOWN),
     (Effect('smooth_torque', 'right', 'angle'), _turned(0.7, 1.8), Verdict.UNKNOWN),
     (Effect('smooth_moment', shape='heading'), _headed(8.0), Verdict.UNKNOWN)])
 def test_another_harmonic_is_a_ripple_and_what_is_mainly_another_law_is_unknown(
@@ -73,7 +73,7 @@ def test_another_harmonic_is_a_ripple_and_what_is_mainly_another_law_is_unknown(
         assert one.adopted
         search = Search(one.base, one.tried[0].fit, one.evidence, (one,),
                         (one.tried[0].hypothesis,))
-        said = answer(search, efforts(search.evidence, search.final),
+        said = answer(search, left_over(search.evidence, search.final),
                       missing_efforts(search.evidence, search.final))
         assert said.features.share > setting('unknown_share')
         assert said.verdict is verdict

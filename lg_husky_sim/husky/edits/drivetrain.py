@@ -70,8 +70,9 @@ def _dry(shape: str, number: str, side: float, rate: str) -> tuple[LawRow, tuple
 
 def _ripple(shape: str, number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
     twice = (0.0, 0.0) if shape == 'once' else ('ripple_cos_twice', 'ripple_sin_twice')
+    thrice = ('ripple_cos_thrice', 'ripple_sin_thrice') if shape == 'thrice' else (0.0, 0.0)
     return LawRow(Law.WHEEL_PHASE, (
-        'ripple_cos', 'ripple_sin', side, 'ripple_speed', *twice)), (rate,)
+        'ripple_cos', 'ripple_sin', side, 'ripple_speed', *twice, *thrice)), (rate,)
 
 
 def _play(shape: str, number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
