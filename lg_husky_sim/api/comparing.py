@@ -29,6 +29,7 @@ from lg_husky_sim.comparison.outcome import (
     RecordingOutcome,
     text_table,
 )
+from lg_husky_sim.comparison.replay import PERIOD
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.folders import result_folder
 from lg_husky_sim.husky.model_file import default_model_path
@@ -264,12 +265,15 @@ def compare(recordings: Recordings, models: Models = None, *, rivals: Recordings
     Raises
     ------
     CommandError
-        If the horizon is negative, there is no model, or not one rival for each recording.
+        If the horizon is shorter than a step of a replay, there is no model, or not one rival for
+        each recording.
     RecordingError
         If there is no recording, or one cannot be used.
     """
-    if not 0.0 <= horizon < math.inf:
-        raise CommandError(f'horizon = {horizon:g} s must be 0 or positive')
+    if not isinstance(horizon, (int, float)) or not (
+            horizon == 0.0 or PERIOD <= horizon < math.inf):
+        raise CommandError(f'horizon = {horizon!r} s must be 0, or a number of at least '
+                           f'{PERIOD:g} s, the step of a replay')
     recordings, rivals = given(recordings), listed(rivals)
     if rivals and len(rivals) != len(recordings):
         raise CommandError(f'{len(rivals)} rivals for {len(recordings)} recordings: give one '

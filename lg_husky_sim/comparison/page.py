@@ -163,7 +163,7 @@ def _headline(table: ErrorTable, recordings: int, seconds: float) -> Headline:
 def _scatter_notes(traces: Sequence[Trace]) -> list[str]:
     # The rate of change of a noisy pose is noisy: that part of the error is no model's.
     said = []
-    for trace in (one for one in traces if one.channel == 'forward'):
+    for trace in (one for one in traces if one.channel == 'forward' and one.times.size > 1):
         step = max(1, round(WINDOW / max(float(np.median(np.diff(trace.times))), 1e-3)))
         bends = np.diff(trace.measured[::step], 2)  # slopes that share no sample
         bends = bends[np.isfinite(bends)]

@@ -17,7 +17,7 @@ from lg_husky_sim.simulation.starting import commanded_until
 import numpy as np
 
 PERIOD = 0.01
-"""Step of a replay [s]."""
+"""Step of a replay, and the shortest time after which one may start anew [s]."""
 WINDOW = 0.4
 """Length of the samples that the initial pose is estimated from [s]."""
 

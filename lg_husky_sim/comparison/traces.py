@@ -47,7 +47,7 @@ def traces_of(parts: Sequence[Predicted], columns: Sequence[str]) -> tuple[Trace
     tuple of Trace
         Recording by recording, the channels that were measured; segments follow each other with
         a gap in between. x is ahead and y to the left of the robot as it stood at the start of
-        the recording's first segment.
+        the recording's first segment, and their errors so at the start of each segment.
     """
     found = []
     for name in dict.fromkeys(segment.recording for segment, _ in parts):
@@ -56,19 +56,22 @@ def traces_of(parts: Sequence[Predicted], columns: Sequence[str]) -> tuple[Trace
         tables: dict[str, list[FloatArray]] = {}
         for segment, predictions in own:
             for channel, table in _segment_tables(segment, predictions, columns).items():
-                tables.setdefault(channel, []).append(table)
+                if len(table):  # a segment may be too short for a slope, or between two samples
+                    tables.setdefault(channel, []).append(table)
         joined = {channel: _joined(tables[channel]) for channel in CHANNELS if channel in tables}
-        _turn(joined, own)
+        last = 2 + len(columns)
+        _turn(joined, own, last)
         for channel, table in joined.items():
             predicted = {column: table[:, 2 + place] for place, column in enumerate(columns)
                          if np.isfinite(table[:, 2 + place]).any()}
-            found.append(Trace(name, channel, table[:, 0], table[:, 1], predicted))
+            errors = dict(zip(columns, table[:, last:].T, strict=False))
+            found.append(Trace(name, channel, table[:, 0], table[:, 1], predicted, errors=errors))
     return tuple(found)
 
 
 def _segment_tables(segment: Segment, predictions: Mapping[str, TimeSeries],
                     columns: Sequence[str]) -> dict[str, FloatArray]:
-    # Times, measured, and a column for each model, by channel.
+    # Times, measured, and a column for each model, by channel; then the tracking errors.
     pairs = {name: channel_pairs(segment, predictions[name]) for name in columns
              if name in predictions}
     tables = {}
@@ -76,6 +79,12 @@ def _segment_tables(segment: Segment, predictions: Mapping[str, TimeSeries],
         missing = np.full(times.size, np.nan)
         tables[channel] = np.column_stack([times, measured, *(
             pairs[name][channel][2] if name in pairs else missing for name in columns)])
+    if 'x' in tables:
+        tracks = [tracking(segment, predictions[name]).error if name in pairs else
+                  np.full((len(tables['x']), 2), np.nan) for name in columns]
+        for place, channel in enumerate(('x', 'y')):
+            tables[channel] = np.column_stack(
+                [tables[channel], *(error[:, place] for error in tracks)])
     return tables
 
 
@@ -101,7 +110,7 @@ def _gap(before: float, after: float, width: int) -> FloatArray:
     return row
 
 
-def _turn(tables: dict[str, FloatArray], own: Sequence[Predicted]) -> None:
+def _turn(tables: dict[str, FloatArray], own: Sequence[Predicted], last: int) -> None:
     # Turn the path into the frame of the robot as it stood at the first start.
     if 'x' not in tables:
         return
@@ -111,9 +120,9 @@ def _turn(tables: dict[str, FloatArray], own: Sequence[Predicted]) -> None:
             if there.size:
                 x, y, heading = (float(series.column(name)[there[0]])
                                  for name in ('x', 'y', 'heading'))
-                east, north = tables['x'][:, 1:] - x, tables['y'][:, 1:] - y
-                tables['x'][:, 1:] = np.cos(heading) * east + np.sin(heading) * north
-                tables['y'][:, 1:] = -np.sin(heading) * east + np.cos(heading) * north
+                east, north = tables['x'][:, 1:last] - x, tables['y'][:, 1:last] - y
+                tables['x'][:, 1:last] = np.cos(heading) * east + np.sin(heading) * north
+                tables['y'][:, 1:last] = -np.sin(heading) * east + np.cos(heading) * north
                 return
 
 

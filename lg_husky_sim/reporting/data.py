@@ -52,6 +52,8 @@ class Trace:
         By column, such as :data:`NOMINAL`; not a number where a model predicts nothing.
     sigma : numpy.ndarray, shape (n,), optional
         Standard deviation expected of measured − predicted [unit of the channel].
+    errors : mapping of str to numpy.ndarray, shape (n,)
+        By column, of x and y: in the frame of the robot at the start of each segment.
     """
 
     recording: str
@@ -60,17 +62,19 @@ class Trace:
     measured: FloatArray
     predicted: Mapping[str, FloatArray]
     sigma: FloatArray | None = None
+    errors: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Copy the arrays and check their lengths."""
         for name in ('times', 'measured'):
             object.__setattr__(self, name, _frozen(getattr(self, name)))
-        object.__setattr__(self, 'predicted', {
-            column: _frozen(values) for column, values in self.predicted.items()})
+        for name in ('predicted', 'errors'):
+            object.__setattr__(self, name, {
+                column: _frozen(values) for column, values in getattr(self, name).items()})
         if self.sigma is not None:
             object.__setattr__(self, 'sigma', _frozen(self.sigma))
         lengths = {self.times.size, self.measured.size,
-                   *(values.size for values in self.predicted.values()),
+                   *(values.size for values in (*self.predicted.values(), *self.errors.values())),
                    *(() if self.sigma is None else (self.sigma.size,))}
         if len(lengths) > 1:
             raise ValueError(f'{self.channel} of {self.recording}: {sorted(lengths)} values')

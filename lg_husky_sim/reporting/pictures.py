@@ -299,7 +299,7 @@ def _draw_tracking(axes: Axes, trace: Trace, styles: Mapping[str, LineStyle]) ->
     axes.axhline(0.0, color='#333333', linewidth=0.8)
     for column, style in styles.items():
         if column in trace.predicted:
-            error = trace.measured - trace.predicted[column]
+            error = trace.errors.get(column, trace.measured - trace.predicted[column])
             most = float(np.max(np.abs(error[np.isfinite(error)]), initial=0.0))
             axes.plot(trace.times, error, label=f'|{name}| ≤ {most:.3g} m', **style.drawn)
     axes.set_ylabel(f'{trace.channel} error [m]')

@@ -56,7 +56,7 @@ def thinned(trace: Trace, most: int) -> Trace:
     return replace(
         trace, times=trace.times[places], measured=trace.measured[places],
         predicted={name: values[places] for name, values in trace.predicted.items()},
-        sigma=None if trace.sigma is None else trace.sigma[places])
+        sigma=None if trace.sigma is None else trace.sigma[places], errors={})
 
 
 def paired(x: Trace, y: Trace, most: int) -> tuple[Trace, Trace]:
@@ -83,7 +83,7 @@ def paired(x: Trace, y: Trace, most: int) -> tuple[Trace, Trace]:
         cut = slice(None, None, step)
         return replace(trace, times=trace.times[cut], measured=_gapped(trace.measured, step),
                        predicted={n: _gapped(v, step) for n, v in trace.predicted.items()},
-                       sigma=None if trace.sigma is None else trace.sigma[cut])
+                       sigma=None if trace.sigma is None else trace.sigma[cut], errors={})
     return every(x), every(y)
 
 

@@ -205,8 +205,9 @@ def test_compare_replaces_its_own_results_only(bag: Path, capsys: Any) -> None:
 
 
 @pytest.mark.parametrize(('extra', 'message'), [
-    (['--horizon', '-1'], 'horizon = -1 s must be 0 or positive'),
-    (['--horizon', 'nan'], 'horizon = nan s must be 0 or positive'),
+    (['--horizon', '-1'], 'horizon = -1.0 s must be 0, or a number of at least 0.01 s'),
+    (['--horizon', 'nan'], 'horizon = nan s must be 0, or a number of at least 0.01 s'),
+    (['--horizon', '0.0001'], 'horizon = 0.0001 s must be 0, or a number of at least 0.01 s'),
     (['--rival', '/dev/null', '--rival', '/dev/null'], '2 rivals for 1 recordings'),
     (['--topic', 'command=/nope'], 'no topic /nope for command; there are'),
     (['--set', 'mass=nan'], 'mass = nan kg is not a finite number'),

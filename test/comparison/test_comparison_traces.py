@@ -11,6 +11,8 @@ from lg_husky_sim.comparison.models import NamedPlant
 from lg_husky_sim.comparison.rival import rival_prediction
 from lg_husky_sim.comparison.traces import change_intervals, error_table, traces_of
 from lg_husky_sim.recording import Recording, Segment, segments, windows
+from lg_husky_sim.reporting.data import Headline, ReportData
+from lg_husky_sim.reporting.pictures import path_picture
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
@@ -49,6 +51,36 @@ def test_between_segments_no_line_is_drawn(
         if one.channel == 'wheel_left')
     assert np.isnan(trace.measured).sum() == len(parts) - 1
     assert np.all(np.diff(trace.times) >= 0.0)
+
+
+@pytest.mark.parametrize('horizon', [0.05, 0.5])
+def test_segments_too_short_for_a_slope_have_no_trace_of_it(
+        paper: NamedPlant, drive: Callable[[str], Recording], horizon: float) -> None:
+    parts = windows(segments(drive('circle'))[0], horizon)[:20]
+    found = traces_of([(part, {'paper': replay(paper.plant, part)}) for part in parts],
+                      ('paper',))
+    channels = {one.channel for one in found}
+    assert {'wheel_left', 'yaw_rate', 'x', 'y'} <= channels
+    # A slope over half a second needs as long a segment; on the edge, rounding says.
+    assert horizon == 0.5 or 'forward' not in channels
+    assert all(np.isfinite(one.measured).any() for one in found)
+
+
+def test_the_tracking_errors_of_a_picture_are_those_of_the_table(
+        paper: NamedPlant, drive: Callable[[str], Recording]) -> None:
+    parts = [(part, {'off': _changed(part, replay(paper.plant, part), 'y', 0.1 + 0.1 * place)})
+             for place, part in enumerate(windows(segments(drive('circle'))[0], 9.0))]
+    assert len(parts) > 1
+    rows = {row.name: row.values['off'] for row in error_table('', parts, ('off',)).rows}
+    traces = {one.channel: one for one in traces_of(parts, ('off',))}
+    for axis in 'xy':
+        drawn = float(np.nanmax(np.abs(traces[axis].errors['off'])))
+        assert drawn == pytest.approx(rows[f'largest |{axis.upper()}| error [m]'], rel=1e-9)
+    figure = path_picture(ReportData('', Headline(''), ('off',), traces=tuple(traces.values())),
+                          parts[0][0].recording)
+    legends = [axes.get_legend() for axes in figure.axes[1:]]
+    labels = [one.get_texts()[0].get_text() for one in legends if one]
+    assert labels == [f'|{axis}| ≤ {rows[f"largest |{axis}| error [m]"]:.3g} m' for axis in 'XY']
 
 
 def test_the_table_has_the_errors_and_the_papers_bounds(
