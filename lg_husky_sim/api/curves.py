@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.api.axes import axes_or_new
 from lg_husky_sim.api.tables import page_part, Table
@@ -16,13 +16,12 @@ from lg_husky_sim.linear_graph.graph import suggestion
 import numpy as np
 from numpy.typing import NDArray
 
+if TYPE_CHECKING:
+    from lg_husky_sim.linear_graph.modes import StepFigures
+
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-RISE = (0.1, 0.9)
-"""Parts of the final value between which the rise time is taken; the usual ones."""
-BAND = 0.02
-"""Part of the final value within which a response has settled; the usual one."""
 BANDWIDTH = 3.0
 """Loss of gain [dB] at the bandwidth."""
 LEAST_GAIN, LEAST_PHASE = 20.0, 90.0
@@ -62,10 +61,12 @@ class StepResponse:
         The input.
     final : numpy.ndarray, shape (n_outputs,)
         What each output settles at, NaN where it does not.
+    figures : sequence of StepFigures
+        Of each output's whole response, whatever the times are.
     left_out : str
         What it is without, as it is not linear; '' for nothing.
-    unsettled : str
-        Which outputs have no steady state, and why; '' for none.
+    notes : str
+        Which outputs have no steady state, and why, and what else to know; '' for nothing.
     """
 
     times: FloatArray
@@ -75,8 +76,9 @@ class StepResponse:
     source: str
     source_unit: str
     final: FloatArray
+    figures: Sequence[StepFigures]
     left_out: str = ''
-    unsettled: str = ''
+    notes: str = ''
 
     def __post_init__(self) -> None:
         """Set the arrays read-only."""
@@ -111,43 +113,10 @@ class StepResponse:
         """Return final value, rise and settling time, overshoot and peak of each output."""
         return Table('', ('output', 'unit', 'final value', 'rise time 10-90 % [s]',
                           'settling time 2 % [s]', 'overshoot [%]', 'peak', 'peak time [s]'),
-                     tuple((name, unit, None if np.isnan(final) else float(final),
-                            *self._shape(at), *self._peak(at))
-                           for at, (name, unit, final) in enumerate(zip(
-                               self.names, self.units, self.final, strict=True))))
-
-    def _peak(self, at: int) -> tuple[float | None, float | None]:
-        """Return the largest value and its time; None where it is the last one, and no peak."""
-        peak = int(np.abs(self.values[:, at]).argmax())
-        if peak == len(self.times) - 1 or not self.values[peak, at]:
-            return None, None
-        return float(self.values[peak, at]), float(self.times[peak])
-
-    def _shape(self, at: int) -> tuple[float | None, float | None, float | None]:
-        """Return rise time, settling time and overshoot of an output; None where not seen."""
-        final = float(self.final[at])
-        if np.isnan(final) or final == 0.0:
-            return None, None, None
-        part = self.values[:, at] / final
-        rise = [self._first_above(part, level) for level in RISE]
-        outside = np.flatnonzero(np.abs(part - 1.0) > BAND)
-        settled = None
-        if not outside.size:
-            settled = 0.0
-        elif outside[-1] + 1 < part.size:
-            last = int(outside[-1])
-            settled = float(np.interp(BAND, np.abs(part[[last + 1, last]] - 1.0),
-                                      self.times[[last + 1, last]]))
-        return (None if rise[0] is None or rise[1] is None else rise[1] - rise[0], settled,
-                max(0.0, 100.0 * float(part.max() - 1.0)))
-
-    def _first_above(self, part: FloatArray, level: float) -> float | None:
-        above = np.flatnonzero(part >= level)
-        if not above.size:
-            return None
-        at = int(above[0])
-        return float(self.times[0]) if at == 0 else float(
-            np.interp(level, part[[at - 1, at]], self.times[[at - 1, at]]))
+                     tuple((name, unit, None if np.isnan(final) else float(final), one.rise,
+                            one.settling, one.overshoot, one.peak, one.peak_time)
+                           for name, unit, final, one in zip(
+                               self.names, self.units, self.final, self.figures, strict=True)))
 
     def plot(self, axes: Any = None, label: str = '') -> Any:
         """
@@ -190,12 +159,12 @@ class StepResponse:
 
     def __str__(self) -> str:
         """Return the table as text."""
-        return _lines(self._title, self.left_out, str(self.table()), self.unsettled)
+        return _lines(self._title, self.left_out, str(self.table()), self.notes)
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return page_part(self._title, [*filter(None, (self.left_out, self.unsettled))],
+        return page_part(self._title, [*filter(None, (self.left_out, self.notes))],
                          [self.table()])
 
 

@@ -6,14 +6,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.api.curves import FrequencyResponse, StepResponse
 from lg_husky_sim.api.transfer_functions import root_text, TransferFunction, warn_of
 from lg_husky_sim.errors import GraphError
 from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, StateSpace
+from lg_husky_sim.linear_graph.state_space import FloatArray
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from lg_husky_sim.linear_graph.modes import StepFigures
 
 
 class Responses(ABC):
@@ -105,7 +109,7 @@ class Responses(ABC):
         Parameters
         ----------
         times : array_like, shape (n_times,), optional
-            Equally spaced from 0 [s]; until the slowest pole has settled by default.
+            Equally spaced from 0 [s]; until all outputs have settled by default.
         output, source : str
             Which output (all by default), and which input.
         **values : float
@@ -124,25 +128,38 @@ class Responses(ABC):
         ParameterError
             If the times are not equally spaced from 0, or a parameter has no number.
         """
+        from lg_husky_sim.linear_graph.modes import StepFigures
         from lg_husky_sim.linear_graph.transfer import (
             checked_times,
             final_values,
+            MOST_EXACT,
             step_response,
             usual_times,
         )
         first, source = self._names(output or self._first_output(), source)
         space = self._space(first if output else '', values)
         moments = usual_times(space.poles) if times is None else checked_times(times)
-        found = step_response(space, moments, space.inputs.index(source))
-        final, unsettled = final_values(space, space.inputs.index(source)), ''
-        if final is None:       # an output may settle all the same
+        column = space.inputs.index(source)
+        found = step_response(space, moments, column)
+        final = final_values(space, column)
+        figures, notes = (StepFigures(),) * len(space.outputs), []
+        if final is None or len(space.states) <= MOST_EXACT:
             answers = [self._in_numbers(name, source, values) for name in space.outputs]
-            final = np.array([one.dc_gain if (one.poles.real < 0.0).all() else np.nan
-                              for one in answers])
-            unsettled = _unsettled(answers)
+            final = np.array([one.final_value for one in answers])
+            notes = [_unsettled(answers)]
+        if len(space.states) > MOST_EXACT:
+            notes += [f'Figures are worked out for up to {MOST_EXACT} states']
+        else:
+            figures = tuple(one.step_figures(float(usual_times(one.poles)[-1])) for one in answers)
+            late = max((one.settling or 0.0 for one in figures), default=0.0)
+            if times is None and late > moments[-1]:
+                moments = usual_times(space.poles, late)
+                found = step_response(space, moments, column)
+            notes += [_endless(space.outputs, figures)]
+        notes += [_coarse(moments, space.poles)]
         return StepResponse(
             moments, found, space.outputs, tuple(map(self._unit, space.outputs)), source,
-            self._unit(source), final, self.left_out, unsettled)
+            self._unit(source), final, figures, self.left_out, '\n'.join(filter(None, notes)))
 
     def bode(self, rates: ArrayLike | None = None, output: str = '', source: str = '',
              **values: float) -> FrequencyResponse:
@@ -239,3 +256,18 @@ def _unsettled(answers: Sequence[TransferFunction]) -> str:
             why.setdefault('a pair of poles without damping swings on', []).append(one.output)
     said = '; '.join(f'{", ".join(names)} ({reason})' for reason, names in why.items())
     return f'No steady state: {said}' if said else ''
+
+
+def _endless(names: Sequence[str], figures: Sequence[StepFigures]) -> str:
+    """Say for which outputs figures are missing as they swing for too long."""
+    found = [name for name, one in zip(names, figures, strict=True) if not one.complete]
+    return (f'{", ".join(found)}: too many swings until the end for all figures' if found else '')
+
+
+def _coarse(times: FloatArray, poles: NDArray[np.complex128]) -> str:
+    """Say that samples are too far apart for a swing (the sampling theorem)."""
+    fastest = float(np.abs(poles.imag).max(initial=0.0))
+    if fastest * (times[1] - times[0]) < np.pi:
+        return ''
+    return (f'The times are too far apart to show the swing at {fastest:.6g} rad/s; the figures '
+            'do not depend on them')

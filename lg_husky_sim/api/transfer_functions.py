@@ -7,13 +7,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any
+from typing import Any, TYPE_CHECKING
 import warnings
 
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.extras import require
+from lg_husky_sim.linear_graph.transfer import STANDING
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from lg_husky_sim.linear_graph.modes import StepFigures
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -60,7 +64,19 @@ class TransferFunction:
     def dc_gain(self) -> float:
         """The value at s = 0; infinite with a pole there."""
         above, below = float(self.numerator[-1]), float(self.denominator[-1])
-        return above / below if below else float(np.copysign(np.inf, above))
+        return above / below + 0.0 if below else float(np.copysign(np.inf, above))     # no -0
+
+    @property
+    def final_value(self) -> float:
+        """What the response to a unit step settles at; NaN if it does not."""
+        settles = (self.poles.real < -STANDING * np.abs(self.poles)).all()
+        return self.dc_gain if settles else float('nan')
+
+    def step_figures(self, end: float) -> StepFigures:
+        """Return the figures of a step response; where it does not settle, until a time [s]."""
+        from lg_husky_sim.linear_graph.modes import step_figures, step_modes
+        modes = step_modes(self.numerator[0], self.zeros, self.poles)
+        return step_figures(modes, self.final_value, end)
 
     def __call__(self, s: Any) -> Any:
         """Return the value at a complex frequency, or at each of an array of them [1/s]."""
@@ -94,7 +110,7 @@ class TransferFunction:
             for root in roots:
                 size = abs(root)
                 rows.append((kind, root_text(root), float(size),
-                             float(-root.real / size) if size else None,
+                             float(0.0 - root.real / size) if size else None,
                              float(-1.0 / root.real) if root.real else None))
         return Table('', ('', 'value [1/s]', 'natural frequency [rad/s]', 'damping ratio',
                           'time constant [s]'), tuple(rows))

@@ -141,12 +141,12 @@ def expression(numerator: FloatArray, denominator: FloatArray) -> Any:
     return above / below
 
 
-def usual_times(poles: NDArray[np.complex128]) -> FloatArray:
-    """Return times [s] from 0 in which a response of these poles settles."""
+def usual_times(poles: NDArray[np.complex128], settling: float = 0.0) -> FloatArray:
+    """Return times [s] from 0 for a response of these poles that settles at a time [s]."""
     moving = poles[np.abs(poles) > STANDING * np.abs(poles).max(initial=0.0)]
     ends = [SETTLED / abs(pole.real) if abs(pole.real) > STANDING * abs(pole)
             else PERIODS * 2.0 * np.pi / abs(pole) for pole in moving]
-    end = max(ends, default=1.0)
+    end = max([settling, *ends]) or 1.0
     step = 10.0 ** np.floor(np.log10(end))      # a round one
     end = np.ceil(end / step) * step
     count = np.clip(PER_FASTEST * end * np.abs(poles).max(initial=0.0), STEPS, FINEST)
@@ -220,7 +220,8 @@ def checked_times(times: ArrayLike) -> FloatArray:
         If they are not equally spaced from 0.
     """
     t = _numbers(times)
-    if t.ndim != 1 or t.size < 2 or t[0] != 0.0 or not np.allclose(np.diff(t), t[1]) or t[1] <= 0:
+    if t.ndim != 1 or t.size < 2 or t[0] != 0.0 or not t[1] > 0 or not np.allclose(
+            np.diff(t), t[1], atol=0.0):
         raise ParameterError('times must be two or more, equally spaced from 0')
     return t
 
