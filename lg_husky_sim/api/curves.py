@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-BANDWIDTH = 3.0
-"""Loss of gain [dB] at the bandwidth."""
 LEAST_GAIN, LEAST_PHASE = 20.0, 90.0
 """Least ranges of gain [dB] and phase [deg] that a picture shows."""
 
@@ -185,6 +183,10 @@ class FrequencyResponse:
         Names, and the unit of output over input; '' if it has none.
     left_out : str
         What it is without, as it is not linear; '' for nothing.
+    figures : tuple of (str, float, float, float)
+        Name, angular frequency [rad/s], gain [dB] and phase [deg] of the largest gain, where it
+        is between the ends, and of the bandwidth: 3 dB below the gain at rest. From poles and
+        zeros, whatever lies between the rates given.
     """
 
     rates: FloatArray
@@ -194,6 +196,7 @@ class FrequencyResponse:
     source: str
     unit: str
     left_out: str = ''
+    figures: tuple[tuple[str, float, float, float], ...] = ()
 
     def __post_init__(self) -> None:
         """Set the arrays read-only."""
@@ -257,22 +260,15 @@ class FrequencyResponse:
         return np.array(found, dtype=object)
 
     def table(self) -> Table:
-        """Return gain and phase at the ends, at the largest gain, and 3 dB below the first."""
-        order = np.argsort(self.rates)
-        rates, gain, phase = (one[order] for one in (self.rates, *self))
-        peak = int(np.argmax(gain))
-        rows = [('lowest', 0), *[('largest gain', peak)] * (0 < peak < gain.size - 1),
-                ('highest', gain.size - 1)]
-        cells = [(name, float(rates[at]), float(gain[at]), float(phase[at])) for name, at in rows]
-        lower = np.flatnonzero(gain < gain[0] - BANDWIDTH)
-        if lower.size and rates[0] > 0.0:
-            span = slice(int(lower[0]) - 1, int(lower[0]) + 1)
-            logs = np.log(rates[span])
-            at = float(np.interp(BANDWIDTH, gain[0] - gain[span], logs))
-            cells.insert(-1, ('3 dB below the lowest', float(np.exp(at)),
-                              float(gain[0] - BANDWIDTH), float(np.interp(at, logs, phase[span]))))
+        """Return gain and phase at the ends, and what ``figures`` says of between."""
+        order = np.argsort(self.rates)[[0, -1]]
+        first, last = ((name, float(self.rates[at]), float(self.gain[at]), float(self.phase[at]))
+                       for name, at in zip(('lowest frequency', 'highest frequency'), order,
+                                           strict=True))
+        rows = (first, *self.figures, last)
         return Table('', ('', 'angular frequency [rad/s]', 'gain [dB]', 'phase [deg]'),
-                     tuple(cells))
+                     tuple((name, rate, 'infinite' if gain == np.inf else gain, phase)
+                           for name, rate, gain, phase in rows))
 
     @property
     def _title(self) -> str:

@@ -170,7 +170,7 @@ class Responses(ABC):
         ----------
         rates : array_like, shape (k,), optional
             Angular frequencies [rad/s]; by default from a decade below all poles and zeros to
-            one above.
+            one above, dense at resonances.
         output, source : str
             Names of the output and the input.
         **values : float
@@ -186,12 +186,12 @@ class Responses(ABC):
         ParameterError
             If there is a pole at one of the frequencies, or a parameter has no number.
         """
+        from lg_husky_sim.linear_graph.resonances import Factors, usual_rates
         from lg_husky_sim.linear_graph.transfer import (
             checked_rates,
             frequency_response,
             MOST_EXACT,
             phase_of,
-            usual_rates,
         )
         output, source = self._names(output, source)
         space = self._space(output, values)
@@ -202,13 +202,21 @@ class Responses(ABC):
             rates = usual_rates(np.concatenate([fraction.poles, fraction.zeros]))
         at = checked_rates([] if rates is None else rates)
         found = frequency_response(space, at, 0, space.inputs.index(source))
+        unit = self._unit(output, source)
         if fraction is None:
             angles = np.rad2deg(np.unwrap(np.angle(found)))
-        else:
-            found = found if fraction.gain else 0.0 * found     # rounding, where nothing arrives
-            angles = phase_of(at, fraction.zeros, fraction.poles, fraction.gain)
-        return FrequencyResponse(at, found, angles, output, source, self._unit(output, source),
-                                 self.left_out)
+            return FrequencyResponse(at, found, angles, output, source, unit, self.left_out)
+        found = found if fraction.gain else 0.0 * found     # rounding, where nothing arrives
+        one = Factors(fraction.gain, fraction.zeros, fraction.poles)
+        marks = {'largest gain': one.largest(at), '3 dB below rest': one.bandwidth(at)
+                 } if fraction.gain else {}
+        places = np.array([rate for rate in marks.values() if rate is not None])
+        angles = phase_of(np.append(at, places), one.zeros, one.poles, one.gain)
+        figures = zip([name for name, rate in marks.items() if rate is not None],
+                      map(float, places), map(float, one.decibels(places)),
+                      map(float, angles[at.size:]), strict=True)
+        return FrequencyResponse(at, found, angles[:at.size], output, source, unit, self.left_out,
+                                 tuple(figures))
 
     def _names(self, output: str, source: str) -> tuple[str, str]:
         """Return the names of an output and an input; one that is alone need not be given."""

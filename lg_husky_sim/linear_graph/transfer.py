@@ -23,8 +23,8 @@ SETTLED = 6.0
 """Time constants of the slowest pole that a response is shown for by default; 0.25 % are left."""
 PERIODS = 5.0
 """Periods shown by default where nothing decays."""
-STEPS, FINEST, RATES = 500, 20_000, 400
-"""Least and most intervals of time, and angular frequencies, by default."""
+STEPS, FINEST = 500, 20_000
+"""Least and most intervals of time by default."""
 PER_FASTEST = 5.0
 """Intervals in a time constant of the fastest pole, as far as there may be so many."""
 STANDING = 1e-9
@@ -151,15 +151,6 @@ def usual_times(poles: NDArray[np.complex128], settling: float = 0.0) -> FloatAr
     end = np.ceil(end / step) * step
     count = np.clip(PER_FASTEST * end * np.abs(poles).max(initial=0.0), STEPS, FINEST)
     return np.linspace(0.0, float(end), int(count) + 1)
-
-
-def usual_rates(roots: NDArray[np.complex128]) -> FloatArray:
-    """Return angular frequencies [rad/s], a decade and more around all poles and zeros."""
-    sizes = np.abs(roots)
-    sizes = sizes[sizes > STANDING * sizes.max(initial=0.0)]
-    low, high = (sizes.min(), sizes.max()) if sizes.size else (1.0, 1.0)
-    return np.geomspace(10.0 ** (np.floor(np.log10(low)) - 1.0),
-                        10.0 ** (np.ceil(np.log10(high)) + 1.0), RATES)
 
 
 def step_response(space: StateSpace, times: ArrayLike, source: int) -> FloatArray:

@@ -145,7 +145,7 @@ def test_the_bandwidth_of_a_low_pass() -> None:
         outputs: [V(C)]
         """)
     rows = {row[0]: row[1:] for row in graph.bode(np.geomspace(1e-3, 1e3, 2000)).table().rows}
-    rate, gain, phase = rows['3 dB below the lowest']
+    rate, gain, phase = rows['3 dB below rest']
     assert rate == pytest.approx(10.0 * np.sqrt(10.0**0.3 - 1.0), rel=1e-4)
     assert (gain, phase) == (pytest.approx(-3.0, abs=1e-3), pytest.approx(-44.93, abs=0.02))
 
