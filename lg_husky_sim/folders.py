@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Folders of results that appear whole or not at all, beside whatever else lies there."""
+"""Results that appear whole or not at all, beside whatever else lies there."""
 
 from __future__ import annotations
 
@@ -38,6 +38,33 @@ def check_folder(path: Path) -> None:
         tempfile.TemporaryDirectory(prefix='.lg_husky.', dir=there).cleanup()
     except OSError as error:
         raise SettingsError(f'{path} cannot be written: {there}: {error.strerror}') from error
+
+
+def check_ours(path: Path, beginning: str) -> None:
+    """
+    Check that a single file may be written: none is there, or a result of an earlier run.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    beginning : str
+        With which every such result begins; '' where none can be there. An empty file may go.
+
+    Raises
+    ------
+    SettingsError
+        If something else is there.
+    """
+    if path.is_dir():
+        raise SettingsError(f'{path} is a folder; choose another name')
+    if not path.exists():
+        return
+    if path.is_file():
+        with path.open('rb') as file:
+            head = file.read(max(1, len(beginning.encode())))
+        if not head or (beginning and head == beginning.encode()):
+            return
+    raise SettingsError(f'{path} exists and is no such result of lg_husky; choose another name')
 
 
 @contextmanager

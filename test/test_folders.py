@@ -4,10 +4,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+import lg_husky_sim as lg
+from lg_husky_sim.cli.main import run
 from lg_husky_sim.errors import SettingsError
-from lg_husky_sim.folders import check_folder, result_folder
+from lg_husky_sim.folders import check_folder, check_ours, result_folder
+from lg_husky_sim.identification.report import report_paths
 import pytest
 
 
@@ -124,3 +128,38 @@ def test_a_folder_may_be_a_file_system_of_its_own(tmp_path: Path) -> None:
             assert place in folder.parents
             (folder / 'result.json').write_text('x')
         assert {path.name for path in place.iterdir()} == {'result.json', '.result.json.files'}
+
+
+@pytest.mark.parametrize(('there', 'kept'), [
+    ('schema: x\nvalue: 1\n', False), ('', False), ('my own\n', True), ('schema: y\n', True),
+    ('schema', True)])
+def test_a_single_file_is_replaced_only_by_its_like(
+        tmp_path: Path, there: str, kept: bool) -> None:
+    path = tmp_path / 'file.yaml'
+    check_ours(path, 'schema: x')
+    path.write_text(there)
+    if not kept:
+        check_ours(path, 'schema: x')
+        return
+    with pytest.raises(SettingsError, match='exists and is no such result of lg_husky'):
+        check_ours(path, 'schema: x')
+
+
+def test_files_of_a_user_are_never_replaced(tmp_path: Path) -> None:
+    model, way, plan = (tmp_path / name for name in ('a.yaml', 'a.tum', 'plan.yaml'))
+    drive = lg.Husky().simulate([[0.0, 0.0, 0.0], [1.0, 0.5, 0.0]])
+    for _ in range(2):  # the second time over its like
+        lg.Husky(mass=60.0).save(model)
+        drive.save_tum(way)
+    for path in (model, way, plan, tmp_path / 'b.txt', tmp_path / 'bag.foxglove.json'):
+        path.write_text('my own\n')
+    compared = lg.compare(drive, progress=False)
+    writers: list[tuple[Callable[[Path], object], Path, str]] = [
+        (lg.Husky().save, model, 'a.yaml'), (drive.save_tum, way, 'a.tum'),
+        (report_paths, model, 'a.yaml'), (report_paths, tmp_path / 'b.yaml', 'b.txt'),
+        (compared.save_bag, tmp_path / 'bag', 'bag.foxglove.json')]
+    for write, path, named in writers:
+        with pytest.raises(SettingsError, match=f'{named} exists and is no such result'):
+            write(path)
+    assert run(['plan-drive', '--effects', 'payload,motor_inductance', '--out', str(plan)]) == 1
+    assert {path.read_text() for path in tmp_path.iterdir()} == {'my own\n'}

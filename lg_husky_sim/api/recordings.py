@@ -198,7 +198,7 @@ class Recording(rec.Recording):
         Parameters
         ----------
         path : path-like
-            Replaced if it is there.
+            Replaced if such a file is there.
 
         Returns
         -------
@@ -209,6 +209,8 @@ class Recording(rec.Recording):
         ------
         RecordingError
             If the recording has no pose.
+        SettingsError
+            If something else is there.
         """
         from lg_husky_sim.recording.tum import write_tum
         return write_tum(path, self.pose, self.start_ns)

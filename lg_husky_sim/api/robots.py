@@ -273,7 +273,7 @@ class Husky(Graph):
                         topics=topics, progress=progress)
 
     def save(self, path: PathLike) -> Path:
-        """Write the model file, which ``sim_node``, ``simulate`` and ``Husky(path)`` read."""
+        """Write the model file, which ``sim_node`` and ``Husky(path)`` read; replace only such."""
         save_model(self.model, path)
         return Path(path)
 

@@ -46,11 +46,14 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     from lg_husky_sim.diagnosis.planning import drives, plan, usual_speeds
     from lg_husky_sim.diagnosis.settings import setting
     from lg_husky_sim.errors import SettingsError
+    from lg_husky_sim.folders import check_ours
+    from lg_husky_sim.manoeuvres import SCHEMA
 
     if (folder is None) == (effects is None):
         raise SettingsError('give either the folder of a diagnosis or --effects A,B')
     if out.is_dir() or not out.resolve().parent.is_dir():
         raise SettingsError(f'cannot write {out}: it must be a file in an existing folder')
+    check_ours(out, f'schema: {SCHEMA}')
     one, two = _from_folder(folder) if folder is not None else _from_ids(effects or '', robot)
     speed, rate = usual_speeds(one.parameters)
     candidates = drives(max_speed or speed, max_yaw or rate)

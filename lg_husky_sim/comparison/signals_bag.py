@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 from lg_husky_sim.comparison.metrics import measured_channels, pose_rates, predicted_at, UNITS
 from lg_husky_sim.comparison.outcome import RecordingOutcome
+from lg_husky_sim.folders import check_ours
 from lg_husky_sim.recording.tum import write_tum
 from lg_husky_sim.recording.writer import write_signals
 from lg_husky_sim.signals import TimeSeries
@@ -45,17 +46,22 @@ def write_comparison_bag(path: Path, outcome: RecordingOutcome, overwrite: bool 
     ------
     RecordingError
         If something is at `path` already.
+    SettingsError
+        If a file of another origin has the name of a layout.
     """
+    layouts = beside(path, '.foxglove.json'), beside(path, '.plotjuggler.xml')
+    if not path.exists():  # beside such a bag, they are the bag's
+        for layout in layouts:
+            check_ours(layout, '')
     signals, poses = comparison_signals(outcome)
     recording = outcome.recording
     write_signals(path, signals, poses, start_ns=recording.start_ns,
                   frame=recording.frames[0] or 'odom', overwrite=overwrite)
     names = tuple(topic_names(outcome).values())
     channels = [name for name in UNITS if f'/{MEASURED}/{name}' in signals]
-    beside(path, '.foxglove.json').write_text(
+    layouts[0].write_text(
         json.dumps(foxglove_layout(names, channels), indent=1) + '\n', encoding='utf-8')
-    beside(path, '.plotjuggler.xml').write_text(
-        plotjuggler_layout(names, channels), encoding='utf-8')
+    layouts[1].write_text(plotjuggler_layout(names, channels), encoding='utf-8')
     return path
 
 

@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 
 from lg_husky_sim.errors import LgHuskyError, ModelFileError, ParameterError
-from lg_husky_sim.folders import scratch_beside
+from lg_husky_sim.folders import check_ours, scratch_beside
 from lg_husky_sim.husky.by_hand import about_of, Number, other_robot, with_numbers
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.model_reader import read_model
@@ -22,6 +22,9 @@ from lg_husky_sim.yaml_files import read_yaml, shown, yaml_text
 
 #: What else `Husky(...)` takes by name, so that no parameter is called so.
 RESERVED = ('self', 'model', 'about')
+
+BEGINNING = f'schema: {SCHEMA}'
+"""With which every file that is written here begins."""
 
 PAPER = 'paper'
 """Name of the packaged model where a file is asked for."""
@@ -225,9 +228,15 @@ def save_model(model: ModelFile, path: str | os.PathLike[str]) -> None:
     ----------
     model : ModelFile
     path : path-like
-        Replaced if it is there.
+        Replaced if a model file is there.
+
+    Raises
+    ------
+    SettingsError
+        If something else is there.
     """
     place = Path(path)
+    check_ours(place, BEGINNING)
     with scratch_beside(place) as scratch:
         draft = scratch / place.name
         draft.write_text(yaml_text(model_data(model)), encoding='utf-8')

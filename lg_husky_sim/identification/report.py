@@ -16,11 +16,11 @@ from lg_husky_sim.comparison.outcome import RANKED
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.traces import error_table, Predicted, traces_of
 from lg_husky_sim.errors import SettingsError
-from lg_husky_sim.folders import scratch_beside
+from lg_husky_sim.folders import check_ours, scratch_beside
 from lg_husky_sim.husky.model import compile_model
-from lg_husky_sim.husky.model_file import ModelFile, save_model
+from lg_husky_sim.husky.model_file import BEGINNING, ModelFile, save_model
 from lg_husky_sim.identification.profile import LEVEL, Profile
-from lg_husky_sim.identification.result import Estimated, FitResult
+from lg_husky_sim.identification.result import Estimated, FitResult, SCHEMA
 from lg_husky_sim.identification.start_states import HEAD, summary
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.reporting.data import (
@@ -64,15 +64,17 @@ def report_paths(out: Path) -> tuple[Path, ...]:
     Raises
     ------
     SettingsError
-        If it does not, or a folder is there.
+        If it does not, or something is there that is no earlier fit.
     """
     if out.suffix not in ('.yaml', '.yml'):
         raise SettingsError(f'{out}: a model file ends in .yaml or .yml')
-    paths = (out, *(out.with_suffix(end) for end in ('.txt', '.json', '.html')))
-    for path in paths:
-        if path.is_dir():
-            raise SettingsError(f'{path} is a folder; choose another name')
-    return paths
+    text, data, html = (out.with_suffix(end) for end in ('.txt', '.json', '.html'))
+    check_ours(out, BEGINNING)
+    check_ours(data, f'{{\n "schema": "{SCHEMA}"')
+    for path in (text, html):
+        if path.is_dir() or not data.is_file():  # beside the JSON of a fit, they are the fit's
+            check_ours(path, '')
+    return out, text, data, html
 
 
 @contextmanager

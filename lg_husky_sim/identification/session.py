@@ -11,7 +11,7 @@ from pathlib import Path
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.estimate import estimate, STARTS
-from lg_husky_sim.identification.report import write_fit
+from lg_husky_sim.identification.report import report_paths, write_fit
 from lg_husky_sim.identification.result import FitResult, Method
 from lg_husky_sim.parallel import run_tasks
 from lg_husky_sim.recording import (
@@ -118,13 +118,15 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
     Raises
     ------
     SettingsError
-        If ``out`` is a file, or two recordings would share a name.
+        If ``out`` is a file, two recordings would share a name, or one has that of another file.
     """
     if out.exists() and not out.is_dir():
         raise SettingsError(f'{out} is not a folder; --each needs one')
     names = [Path(path).name for path in paths]
     if len(set(names)) != len(names):
         raise SettingsError('two recordings have one name; --each writes a file for each')
+    for name in names:
+        report_paths(out / f'{name}.yaml')
     word = tell or (lambda text: None)
     # A worker of a cluster may work in another folder.
     tasks = [_Task(request, str(Path(path).absolute())) for path in paths]

@@ -7,9 +7,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from lg_husky_sim.folders import scratch_beside
+from lg_husky_sim.folders import check_ours, scratch_beside
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
+
+#: First line of every file.
+HEAD = '# timestamp x y z qx qy qz qw'
 
 
 def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0) -> Path:
@@ -19,7 +22,7 @@ def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0)
     Parameters
     ----------
     path : path-like
-        Replaced if it is there.
+        Replaced if such a file is there.
     pose : TimeSeries
         Names x, y [m], heading [rad].
     start_ns : int
@@ -28,10 +31,16 @@ def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0)
     Returns
     -------
     pathlib.Path
+
+    Raises
+    ------
+    SettingsError
+        If something else is there.
     """
     place = Path(path)
+    check_ours(place, HEAD)
     stamps = start_ns + np.round(pose.times * 1e9).astype(np.int64)
-    lines = ['# timestamp x y z qx qy qz qw']
+    lines = [HEAD]
     for stamp, (x, y, heading) in zip(stamps.tolist(), pose.values.tolist(), strict=True):
         # Written from integers: a float of seconds since 1970 holds no nanoseconds.
         lines.append(f'{stamp // 10**9}.{stamp % 10**9:09d} {x:.9g} {y:.9g} 0 0 0 '
