@@ -67,6 +67,26 @@ def check_ours(path: Path, beginning: str) -> None:
     raise SettingsError(f'{path} exists and is no such result of lg_husky; choose another name')
 
 
+def check_marked(path: Path, mark: str) -> None:
+    """
+    Check that a single file may be written: none is there, or one that has a mark of ours in it.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    mark : str
+        Such as the schema. An empty file may go, too.
+
+    Raises
+    ------
+    SettingsError
+        If something else is there.
+    """
+    if path.is_file() and mark.encode() in path.read_bytes():
+        return
+    check_ours(path, '')
+
+
 @contextmanager
 def scratch_beside(path: Path) -> Iterator[Path]:
     """

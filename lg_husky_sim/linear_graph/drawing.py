@@ -11,15 +11,18 @@ from typing import Any
 
 from lg_husky_sim.errors import GraphError
 from lg_husky_sim.extras import require
-from lg_husky_sim.folders import scratch_beside
+from lg_husky_sim.folders import check_marked, scratch_beside
 from lg_husky_sim.linear_graph.elements import Domain
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.layout import Block, Curve, HEIGHT, layout, Point
 from lg_husky_sim.linear_graph.normal_tree import normal_tree
 
 FORMATS = ('.svg', '.png', '.pdf')
+MARK = 'lg_husky_sim/linear_graph/1'
+"""Program that a picture says has made it, by which it may be replaced."""
 SCALE = 0.62    # inches a drawing unit
 HEADING = 0.45  # inches
+LEGEND = 7.0    # width that the legend needs, in drawing units
 _COLOURS = {
     Domain.ELECTRICAL: '#8a5a00', Domain.TRANSLATIONAL: '#1b5fa6', Domain.ROTATIONAL: '#1d7a46',
     Domain.FLUID: '#6b3fa0', Domain.THERMAL: '#a83232'}
@@ -71,7 +74,8 @@ def draw_graph(axes: Any, graph: LinearGraph, *, culprits: Collection[str] = (),
         _link(axes, middles[f'{two_port.name}.1'], middles[f'{two_port.name}.2'])
     _legend(axes, bool(graph.two_ports), bool(culprits), bool(new))
     right = max(block.x + block.width for block in blocks)
-    axes.set_xlim(-0.5, max(right, 7.0) + 0.5)
+    spare = max(LEGEND - right, 0.0) / 2.0
+    axes.set_xlim(-0.5 - spare, right + spare + 0.5)
     axes.set_ylim(min(block.y for block in blocks) - 1.5, 1.2)
     axes.set_aspect('equal')
     axes.set_axis_off()
@@ -165,7 +169,7 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
     graph : LinearGraph
         The graph.
     path : path-like
-        Ends in .svg, .png or .pdf.
+        Ends in .svg, .png or .pdf. A picture of ours that is there is replaced.
     title : str
         Heading.
     culprits, new : collection of str
@@ -182,19 +186,22 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
         If the ending is another one, or the graph cannot be drawn.
     MissingExtraError
         If matplotlib is not installed.
+    SettingsError
+        If a file is there that is no such picture.
     OSError
         If the file cannot be written.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
         raise GraphError(f'picture {str(path)!r} must end in {", ".join(FORMATS)}')
+    check_marked(path, MARK)
     require('matplotlib', 'draw graphs')
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     blocks = layout(graph)
-    width = max(max(block.x + block.width for block in blocks), 7.0) + 1.0
+    width = max(max(block.x + block.width for block in blocks), LEGEND) + 1.0
     height = -min(block.y for block in blocks) + 2.8
     inches = height * SCALE + (HEADING if title else 0.0)
     figure = Figure(figsize=(width * SCALE, inches))
@@ -208,7 +215,8 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
     with scratch_beside(path) as folder, rc_context(
             {'svg.hashsalt': 'lg_husky_sim', 'svg.fonttype': 'none'}):
         draft = folder / f'picture{path.suffix.lower()}'
-        metadata = {'.svg': {'Date': None}, '.pdf': {'CreationDate': None}}
-        figure.savefig(draft, dpi=150, metadata=metadata.get(path.suffix.lower(), {}))
+        metadata = {'.svg': {'Date': None, 'Creator': MARK}, '.png': {'Software': MARK},
+                    '.pdf': {'CreationDate': None, 'Creator': MARK}}
+        figure.savefig(draft, dpi=150, metadata=metadata[path.suffix.lower()])
         os.replace(draft, path)
     return path

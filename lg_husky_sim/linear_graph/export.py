@@ -14,7 +14,7 @@ from typing import Any
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.extras import require
-from lg_husky_sim.folders import scratch_beside
+from lg_husky_sim.folders import check_marked, scratch_beside
 from lg_husky_sim.linear_graph.state_space import FloatArray, MATRICES, StateSpace
 import numpy as np
 
@@ -127,7 +127,7 @@ def export(space: StateSpace, path: str | os.PathLike[str], name: str = 'model',
     space : StateSpace
     path : path-like
         .json, .mat (MATLAB 5), .npz (NumPy), .h (C), .tex (LaTeX, amsmath) or .py (a module that
-        makes python-control and scipy objects). Replaced if it is there.
+        makes python-control and scipy objects). An export that is there is replaced.
     name : str
         Title.
     parameters : mapping of str to float, optional
@@ -144,7 +144,7 @@ def export(space: StateSpace, path: str | os.PathLike[str], name: str = 'model',
     """
     place = Path(path)
     check_export(place)
-    content = _WRITERS[place.suffix](space, name, dict(parameters or {}))
+    content = _WRITERS[place.suffix.lower()](space, name, dict(parameters or {}), place.stem)
     with scratch_beside(place) as scratch:
         draft = scratch / place.name
         draft.write_bytes(content)
@@ -159,13 +159,12 @@ def check_export(path: Path) -> None:
     Raises
     ------
     SettingsError
-        If the ending is unknown, or a folder is there.
+        If the ending is unknown, or something else than an export is there.
     """
-    if path.suffix not in _WRITERS:
+    if path.suffix.lower() not in _WRITERS:
         raise SettingsError(f'cannot export to {path}: the ending must be one of '
                             f'{", ".join(_WRITERS)}')
-    if path.is_dir():
-        raise SettingsError(f'cannot export to {path}: a folder is there')
+    check_marked(path, SCHEMA)
 
 
 def json_text(space: StateSpace, name: str, parameters: Mapping[str, float]) -> str:
@@ -179,11 +178,11 @@ def json_text(space: StateSpace, name: str, parameters: Mapping[str, float]) -> 
     return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + '\n'
 
 
-def _as_json(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+def _as_json(space: StateSpace, name: str, parameters: Mapping[str, float], _: str) -> bytes:
     return json_text(space, name, parameters).encode()
 
 
-def _as_mat(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+def _as_mat(space: StateSpace, name: str, parameters: Mapping[str, float], _: str) -> bytes:
     from io import BytesIO
 
     from scipy.io import savemat
@@ -191,35 +190,38 @@ def _as_mat(space: StateSpace, name: str, parameters: Mapping[str, float]) -> by
     stream = BytesIO()
     cells = {key: np.array(list(getattr(space, key)), dtype=object) for key in _NAMES
              if getattr(space, key)}
-    savemat(stream, {**used_matrices(space), **cells, 'name': name,
+    savemat(stream, {'schema': SCHEMA, **used_matrices(space), **cells, 'name': name,
                      'parameters': dict(parameters) or np.zeros((0, 0))},
             long_field_names=True)
     return stream.getvalue()
 
 
-def _as_npz(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+def _as_npz(space: StateSpace, name: str, parameters: Mapping[str, float], _: str) -> bytes:
     from io import BytesIO
 
     stream = BytesIO()
     texts = {key: np.array(getattr(space, key), dtype=np.str_) for key in _NAMES}
     arrays: dict[str, Any] = {
-        **used_matrices(space), **texts, 'name': np.array(name),
+        'schema': np.array(SCHEMA.encode()), **used_matrices(space), **texts,
+        'name': np.array(name),
         'parameter_names': np.array(list(parameters), dtype=np.str_),
         'parameter_values': np.array(list(parameters.values()), dtype=np.float64)}
     np.savez(stream, **arrays)
     return stream.getvalue()
 
 
-def _as_c(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+def _as_c(space: StateSpace, name: str, _: Mapping[str, float], stem: str) -> bytes:
     own = linear(space)
+    prefix = re.sub(r'\W', '_', stem if stem[:1].isalpha() else f'model_{stem}', flags=re.ASCII)
     lines = [f'/* {_comment(name)}: dx/dt = A x + B u, y = C x + D u; SI units.',
              *(f' *   {letter}: {", ".join(names) or "none"}' for letter, names in
                (('x', own.states), ('u', own.inputs), ('y', own.outputs))),
              *(f' *   {line}' for line in _shifted(space)),
              *([f' * Non-linear laws are left out: {", ".join(own.efforts)}']
-               if own.efforts else []), ' */',
-             '#ifndef LG_HUSKY_MODEL_H', '#define LG_HUSKY_MODEL_H', '']
-    lines += [f'#define LG_HUSKY_{word} {len(names)}' for word, names in
+               if own.efforts else []),
+             f' * Schema {SCHEMA}. */',
+             f'#ifndef {prefix.upper()}_H', f'#define {prefix.upper()}_H', '']
+    lines += [f'#define {prefix.upper()}_{word} {len(names)}' for word, names in
               (('STATES', own.states), ('INPUTS', own.inputs), ('OUTPUTS', own.outputs))]
     for key in 'ABCD':
         matrix = getattr(own, key)
@@ -227,27 +229,33 @@ def _as_c(space: StateSpace, name: str, parameters: Mapping[str, float]) -> byte
             continue
         rows = ',\n'.join('    {' + ', '.join(repr(float(v)) for v in row) + '}'
                           for row in matrix)
-        lines += ['', f'static const double lg_husky_{key}[{matrix.shape[0]}]'
+        lines += ['', f'static const double {prefix}_{key}[{matrix.shape[0]}]'
                       f'[{matrix.shape[1]}] = {{', rows, '};']
     return '\n'.join([*lines, '', '#endif', '']).encode()
 
 
-def _as_latex(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+def _as_latex(space: StateSpace, name: str, _: Mapping[str, float], __: str) -> bytes:
     own = linear(space)
     left_out = [f'% Non-linear laws are left out: {", ".join(own.efforts)}'
                 ] if own.efforts else []
-    lines = [f'% {_comment(name)}; needs amsmath',
+    lines = [f'% {_comment(name)}; needs amsmath', f'% Schema {SCHEMA}',
              *(f'% {letter}: {", ".join(names) or "none"}' for letter, names in
                (('x', own.states), ('u', own.inputs), ('y', own.outputs))),
              *(f'% {line}' for line in _shifted(space)), *left_out]
     for key in (key for key in 'ABCD' if getattr(own, key).size):
-        rows = ' \\\\\n'.join(' & '.join(repr(float(v)) for v in row)
+        rows = ' \\\\\n'.join(' & '.join(latex_number(float(v)) for v in row)
                               for row in getattr(own, key))
         lines += [rf'\[ {key} = \begin{{bmatrix}}', rows, r'\end{bmatrix} \]']
     return ('\n'.join(lines) + '\n').encode()
 
 
-def _as_python(space: StateSpace, name: str, parameters: Mapping[str, float]) -> bytes:
+def latex_number(value: float) -> str:
+    r"""Return a number in full precision, such as ``2 \times 10^{-9}``."""
+    digits, _, power = repr(value).partition('e')
+    return rf'{digits} \times 10^{{{int(power)}}}' if power else digits
+
+
+def _as_python(space: StateSpace, name: str, _: Mapping[str, float], __: str) -> bytes:
     own = _with_input(linear(space))
     left_out = f'\n\nNon-linear laws are left out: {", ".join(own.efforts)}.' if (
         own.efforts) else ''
@@ -257,6 +265,8 @@ def _as_python(space: StateSpace, name: str, parameters: Mapping[str, float]) ->
     empty = '' if all(getattr(own, key).size for key in 'ABCD') else 'import numpy as np\n\n'
     return f'''"""
 {_comment(name)}: dx/dt = A x + B u, y = C x + D u; SI units.{shifted}{left_out}
+
+Schema {SCHEMA}.
 """
 
 {empty}{names}
@@ -287,6 +297,6 @@ def _comment(text: str) -> str:
     return re.sub(r'[\\"]|\*(?=/)|/(?=\*)', ' ', ' '.join(text.split()))
 
 
-_WRITERS: Mapping[str, Callable[[StateSpace, str, Mapping[str, float]], bytes]] = {
+_WRITERS: Mapping[str, Callable[[StateSpace, str, Mapping[str, float], str], bytes]] = {
     '.json': _as_json, '.mat': _as_mat, '.npz': _as_npz, '.h': _as_c, '.tex': _as_latex,
     '.py': _as_python}

@@ -67,7 +67,7 @@ def test_numpy_reads_the_npz_file_without_pickles(space: StateSpace, tmp_path: P
 def c_matrices(text: str) -> dict[str, object]:
     found: dict[str, object] = {}
     for name, rows, columns, body in re.findall(
-            r'lg_husky_(\w)\[(\d+)\]\[(\d+)\] = \{(.*?)\};', text, re.DOTALL):
+            r'\w+_(\w)\[(\d+)\]\[(\d+)\] = \{(.*?)\};', text, re.DOTALL):
         numbers = [float(v) for v in re.findall(r'[-+\d.e]+', body)]
         found[name] = np.array(numbers).reshape(int(rows), int(columns))
     return found
@@ -79,7 +79,7 @@ def test_c_holds_every_digit_and_compiles(space: StateSpace, tmp_path: Path) -> 
     if compiler := shutil.which('cc'):
         (tmp_path / 'use.c').write_text(
             '#include "husky.h"\n#include <stdio.h>\n'
-            'int main(void) { printf("%.17g", lg_husky_A[5][5]); return 0; }\n')
+            'int main(void) { printf("%.17g", husky_A[5][5]); return 0; }\n')
         subprocess.run([compiler, '-o', 'use', 'use.c'], cwd=tmp_path, check=True, timeout=60)
         said = subprocess.run([tmp_path / 'use'], capture_output=True, check=True, timeout=60)
         assert float(said.stdout) == space.A[5, 5]
@@ -89,7 +89,9 @@ def test_latex_holds_every_digit(space: StateSpace, tmp_path: Path) -> None:
     text = export(space, tmp_path / 'husky.tex').read_text('utf-8')
     found: dict[str, object] = {}
     for name, body in re.findall(r'\\\[ (\w) = \\begin\{bmatrix\}(.*?)\\end', text, re.DOTALL):
-        found[name] = [[float(v) for v in row.split('&')] for row in body.split('\\\\')]
+        found[name] = [
+            [float(re.sub(r' \\times 10\^\{(.*)\}', r'e\1', v)) for v in row.split('&')]
+            for row in body.split('\\\\')]
     assert_same(space, found)
 
 
@@ -207,7 +209,7 @@ def test_headers_are_iso_c_whatever_the_title_is(tmp_path: Path) -> None:
     assert (first, comment.count('two capacitors')) == ('', 1)
     if compiler := shutil.which('cc'):
         (tmp_path / 'use.c').write_text(
-            '#include "one.h"\nint main(void) { return lg_husky_A[0][0] > lg_husky_B[0][0]; }\n')
+            '#include "one.h"\nint main(void) { return one_A[0][0] > one_B[0][0]; }\n')
         subprocess.run([compiler, '-std=c99', '-pedantic-errors', '-Wall', '-Werror', '-o', 'use',
                         'use.c'], cwd=tmp_path, check=True, timeout=60)
 
@@ -226,3 +228,38 @@ def test_a_static_graph_has_d_and_f_alone() -> None:
         outputs: [i(C)]
         """)
     assert (charged.states, charged.numeric().F.tolist()) == ((), [[2.0]])
+
+
+@pytest.mark.parametrize('ending', ['json', 'mat', 'npz', 'h', 'tex', 'py', 'svg', 'png', 'pdf'])
+def test_only_files_of_ours_are_replaced(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f'mine.{ending}'
+    graph = lg.graph(STATIC)
+    write = graph.draw if ending in ('svg', 'png', 'pdf') else graph.export
+    for _ in range(2):
+        write(path)
+    path.write_text('my own\n', 'utf-8')
+    with pytest.raises(SettingsError, match=rf'mine.{ending} exists and is no such result of'):
+        write(path)
+    assert path.read_text('utf-8') == 'my own\n'
+
+
+def test_two_headers_go_into_one_program(tmp_path: Path) -> None:
+    graph = lg.graph(STATIC)
+    graph.export(tmp_path / 'left-motor.h')
+    graph.export(tmp_path / '2nd.h', R_1=3.0)
+    (tmp_path / 'use.c').write_text(
+        '#include "left-motor.h"\n#include "2nd.h"\n#include <stdio.h>\n'
+        'int main(void) { printf("%g %g %d", left_motor_D[0][0], model_2nd_D[0][0],\n'
+        '                        LEFT_MOTOR_INPUTS + MODEL_2ND_OUTPUTS); return 0; }\n')
+    if compiler := shutil.which('cc'):
+        subprocess.run([compiler, '-std=c99', '-Wall', '-Werror', '-o', 'use', 'use.c'],
+                       cwd=tmp_path, check=True, timeout=60)
+        said = subprocess.run([tmp_path / 'use'], capture_output=True, check=True, timeout=60)
+        assert said.stdout == b'0.75 0.5 2'
+
+
+def test_latex_has_powers_of_ten(tmp_path: Path) -> None:
+    graph = lg.graph(STATIC)
+    text = graph.export(tmp_path / 'one.tex', R_1=1.0, R_2=2e-9).read_text('utf-8')
+    assert re.search(r'2\.0\d* \\times 10\^\{-9\}', text)
+    assert 'e-09' not in text
