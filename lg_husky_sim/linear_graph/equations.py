@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from lg_husky_sim.linear_graph.normal_tree import NormalTree
     from lg_husky_sim.linear_graph.symbolic import SymbolicStateSpace
 
+PRODUCT = r' \, '
+"""Between the factors of a product, so that upright names do not run together."""
+
 
 @dataclass(frozen=True)
 class Sum:
@@ -220,10 +223,13 @@ def _value_latex(text: str, replaced: dict[str, str] | None = None) -> str:
     expression = to_sympy(text)
     names = {symbol: (replaced or {}).get(symbol.name, _symbol(symbol.name))
              for symbol in expression.free_symbols}
-    return str(sympy.latex(expression, symbol_names=names))
+    return str(sympy.latex(expression, symbol_names=names, mul_symbol=PRODUCT))
 
 
-_GREEK = {'omega': r'\omega', 'tau': r'\tau'}
+_GREEK = {name: f'\\{name}' for name in (
+    'alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau '
+    'upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega'
+).split()}
 _VARIABLE = re.compile(r'(\w+)\((\w+?)(?:\.([12]))?\)')
 
 
@@ -241,14 +247,17 @@ def latex_of(variable: str) -> str:
 
 
 def _symbol(name: str) -> str:
-    """Return a name with what follows its first underscore as an index."""
+    r"""
+    Return a name with what follows its first underscore as an index.
+
+    A name of several letters is upright, and no product: ``Cf`` is ``\mathrm{Cf}``.
+    """
     head, _, index = name.partition('_')
-    if len(head) > 2 and not re.fullmatch(r'[A-Z]+\d*', head):
+    if not head:
         return rf'\mathrm{{{name}}}'.replace('_', r'\_')
-    if not index:
-        return head
+    head = _GREEK.get(head, head if len(head) == 1 else rf'\mathrm{{{head}}}')
     body = index.replace('_', r'\_')
-    return f'{head}_{{{body}}}'
+    return f'{head}_{{{body}}}' if body else head
 
 
 def aligned(lines: list[str]) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from lg_husky_sim.linear_graph.elements import Branch, SOURCES, TwoPort
-from lg_husky_sim.linear_graph.equations import Equations, latex_of, state_equations
+from lg_husky_sim.linear_graph.equations import Equations, latex_of, PRODUCT, state_equations
 from lg_husky_sim.linear_graph.expressions import evaluate, names_in
 from lg_husky_sim.linear_graph.graph import LinearGraph
 from lg_husky_sim.linear_graph.numeric import NumericModel
@@ -174,8 +174,8 @@ def state_equation_latex(model: SymbolicStateSpace) -> str:
 
 def _equations_latex(model: SymbolicStateSpace) -> list[tuple[str, list[tuple[str, str]]]]:
     """Return what stands left of each equation, and right of it matrices and their columns."""
-    state, inputs, effort = (_column(names) for names in
-                             (model.states, model.inputs, model.efforts))
+    state, inputs = _column(model.states), _column(model.inputs)
+    effort = _column(tuple(f'f({name})' for name in model.efforts))
     rate = rf'\frac{{d}}{{dt}} {inputs}'
     found = []
     for left, shown, terms in (
@@ -194,8 +194,9 @@ def _equations_latex(model: SymbolicStateSpace) -> list[tuple[str, list[tuple[st
 def _matrix_latex(matrix: Any) -> str:
     import sympy
 
-    return str(sympy.latex(matrix, mat_str='bmatrix', mat_delim='', symbol_names={
-        symbol: latex_of(symbol.name) for symbol in matrix.free_symbols}))
+    names = {symbol: latex_of(symbol.name) for symbol in matrix.free_symbols}
+    return str(sympy.latex(matrix, mat_str='bmatrix', mat_delim='', mul_symbol=PRODUCT,
+                           symbol_names=names))
 
 
 def _column(names: tuple[str, ...]) -> str:

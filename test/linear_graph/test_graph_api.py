@@ -38,7 +38,7 @@ def test_the_formula_of_a_notebook_has_the_rate_of_change_of_an_input() -> None:
 
 def test_the_formula_of_a_notebook_has_laws_that_are_not_linear() -> None:
     shown = lg.graph(TANK)._repr_latex_()
-    assert (r'\begin{bmatrix}- \frac{1}{C}\end{bmatrix} \begin{bmatrix} \mathrm{out} '
+    assert (r'\begin{bmatrix}- \frac{1}{C}\end{bmatrix} \begin{bmatrix} f_{\mathrm{out}} '
             r'\end{bmatrix}') in shown
     assert r'\begin{bmatrix} P_{C} \end{bmatrix} &= \begin{bmatrix}1\end{bmatrix}' in shown
 

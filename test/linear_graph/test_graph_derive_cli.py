@@ -172,9 +172,25 @@ def test_latex_has_the_efforts_and_their_arguments(
           d:   {is: damper, from: body, law: quadratic, of: [v(d)], parameters: [p]}
         outputs: [F(m), v(m)]
         """, tmp_path, capsys)
-    assert r'\[ \frac{d}{dt} [v_{m}] = A [v_{m}] + B [F_{s}] + G [d] \]' in shown
-    assert r'\[ [F_{m} \\ v_{m}] = C [v_{m}] + D [F_{s}] + L_c [d] \]' in shown
+    assert r'\[ \frac{d}{dt} [v_{m}] = A [v_{m}] + B [F_{s}] + G [f_{d}] \]' in shown
+    assert r'\[ [F_{m} \\ v_{m}] = C [v_{m}] + D [F_{s}] + L_c [f_{d}] \]' in shown
     assert r'\[ [v_{d}] = H [v_{m}] \]' in shown
+
+
+def test_names_of_several_letters_are_no_products_in_latex(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shown = '\n'.join(latex("""
+        elements:
+          tau_m: {is: torque source, from: ground, to: a}
+          ks: {is: torsion spring, from: a, value: 1}
+          Jrotor_2: {is: inertia, from: a, value: Rload*alpha}
+          Cf: {is: rotary damper, from: a, value: 3}
+        """, tmp_path, capsys))
+    assert r'\tau_{\tau_{m}}' in shown
+    assert r'\frac{d}{dt} \tau_{\mathrm{ks}} &= \mathrm{ks} \omega_{\mathrm{ks}}' in shown
+    assert r'- \frac{\mathrm{Cf}}{\mathrm{Jrotor}_{2}}' in shown
+    from lg_husky_sim.linear_graph.equations import _value_latex
+    assert _value_latex('Rload*alpha*ks') == r'\mathrm{Rload} \, \alpha \, \mathrm{ks}'
 
 
 def test_a_linear_law_of_a_two_port_is_written_out(
