@@ -20,6 +20,17 @@ class ParameterError(LgHuskyError):
     """A physical parameter that is missing, unknown or out of its bounds."""
 
 
+class UnknownParameterError(ParameterError, KeyError):
+    """A parameter of no such name; a KeyError too, as of any mapping."""
+
+    __str__ = Exception.__str__
+
+    def __init__(self, message: str, name: str = '') -> None:
+        """Keep the name."""
+        super().__init__(message)
+        self.name = name
+
+
 class ModelFileError(LgHuskyError):
     """A model file that cannot be read."""
 

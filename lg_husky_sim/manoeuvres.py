@@ -21,13 +21,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import difflib
 import math
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import TimeSeries
-from lg_husky_sim.yaml_files import read_yaml, shown
+from lg_husky_sim.yaml_files import read_yaml, shown, wrong_schema
 import numpy as np
 
 SCHEMA = 'lg_husky_sim/commands/1'
@@ -177,7 +178,7 @@ class Manoeuvre:
         return TimeSeries(times, values, ('forward', 'yaw'))
 
 
-def checked_rate(rate: float) -> float:
+def checked_rate(rate: object) -> float:
     """
     Return a rate [Hz] that is in range.
 
@@ -186,10 +187,10 @@ def checked_rate(rate: float) -> float:
     CommandError
         If it is not positive or too high.
     """
-    if not 0.0 < rate <= LARGEST_RATE:
+    if not isinstance(rate, Real) or not 0.0 < float(rate) <= LARGEST_RATE:
         raise CommandError(
-            f'rate = {rate:g} Hz must be positive and at most {LARGEST_RATE:g} Hz')
-    return rate
+            f'rate = {shown(rate)} Hz must be positive and at most {LARGEST_RATE:g} Hz')
+    return float(rate)
 
 
 def builtin_manoeuvres() -> dict[str, Manoeuvre]:
@@ -246,8 +247,9 @@ def find_manoeuvre(name: str) -> Manoeuvre:
 
 
 def _check_schema(data: Mapping[str, Any], schema: str) -> None:
-    if data.get('schema') != schema:
-        raise CommandError(f'schema is {shown(data.get("schema"))}, expected {schema!r}')
+    wrong = wrong_schema(data, schema)
+    if wrong:
+        raise CommandError(wrong)
 
 
 def _mapping(what: str, value: object) -> dict[str, Any]:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 import os
 from pathlib import Path
 import re
@@ -166,6 +166,16 @@ def shown(value: object) -> str:
     """Return a value as an error message shows it: in one line, cut where it is long."""
     text = repr(value)
     return text if len(text) <= 60 else f'{text[:57]}...'
+
+
+def wrong_schema(content: Mapping[str, object], schema: str) -> str:
+    """Return what is wrong with the schema of a file; '' if it is the one expected."""
+    given = content.get('schema')
+    if given is not None:
+        return '' if given == schema else f'schema is {shown(given)}, expected {schema!r}'
+    if 'elements' in content:
+        return f'this is a linear graph, which only derive and lg.graph take; expected {schema!r}'
+    return f'schema is missing, expected the line schema: {schema}'
 
 
 def _reason(error: Exception) -> str:

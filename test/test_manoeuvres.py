@@ -64,7 +64,7 @@ def test_a_script_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('text', 'message'), [
-    ('steps: []', "schema is None, expected 'lg_husky_sim/commands/1'"),
+    ('steps: []', 'schema is missing, expected the line schema: lg_husky_sim/commands/1'),
     (HEAD, 'steps is not a list'),
     (HEAD + 'steps: []', 'steps is empty'),
     (HEAD + 'steps: [1]', 'step 1: the step is not a mapping'),
@@ -76,7 +76,7 @@ def test_a_script_is_read(tmp_path: Path) -> None:
     (HEAD + 'steps: [{duration: true}]', 'duration = True is not a number'),
     (HEAD + 'steps: [{duration: 1, forward: .nan}]', 'forward = nan is not finite'),
     (HEAD + 'steps: [{duration: 1, yaw: 900}]', r'yaw = 900 rad/s is beyond ±100 rad/s'),
-    (HEAD + 'rate: 0\nsteps: [{duration: 1}]', 'rate = 0 Hz must be positive'),
+    (HEAD + 'rate: 0\nsteps: [{duration: 1}]', 'rate = 0.0 Hz must be positive'),
     (HEAD + 'rate: 1000\nsteps: [{duration: 90000}]', 'is too long'),
     (HEAD + 'steps: [{duration: 1', 'not YAML'),
 ])

@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 import math
-import os
+from numbers import Real
 from pathlib import Path
 import tempfile
 from typing import Any, TYPE_CHECKING, TypeAlias
@@ -270,14 +270,13 @@ def compare(recordings: Recordings, models: Models = None, *, rivals: Recordings
     RecordingError
         If there is no recording, or one cannot be used.
     """
-    if not isinstance(horizon, (int, float)) or not (
-            horizon == 0.0 or PERIOD <= horizon < math.inf):
-        raise CommandError(f'horizon = {horizon!r} s must be 0, or a number of at least '
-                           f'{PERIOD:g} s, the step of a replay')
+    horizon = _checked_horizon(horizon)
     recordings, rivals = given(recordings), listed(rivals)
     if rivals and len(rivals) != len(recordings):
         raise CommandError(f'{len(rivals)} rivals for {len(recordings)} recordings: give one '
                            'for each recording, in their order, or none')
+    if not isinstance(settings, (Mapping, type(None))):
+        raise CommandError(f'settings = {settings!r} is no mapping of parameters to values')
     overridden = dict(settings or {})
     plants = _named(models, overridden)
     with shown(progress) as report:
@@ -297,16 +296,26 @@ def compare(recordings: Recordings, models: Models = None, *, rivals: Recordings
     return Comparison(tuple(outcomes), plants, horizon, overridden)
 
 
+def _checked_horizon(horizon: object) -> float:
+    if not isinstance(horizon, Real) or not (
+            horizon == 0.0 or PERIOD <= float(horizon) < math.inf):
+        raise CommandError(f'horizon = {horizon!r} s must be 0, or a number of at least '
+                           f'{PERIOD:g} s, the step of a replay')
+    return float(horizon)
+
+
 def _named(models: Models, settings: Mapping[str, float]) -> tuple[NamedPlant, ...]:
     if isinstance(models, Mapping):
         chosen = dict(models)
     else:
-        several: Sequence[Model | None] = [models] if models is None or isinstance(
-            models, (str, os.PathLike, Husky)) else list(models)
+        several: Sequence[Model | None] = list(models) if isinstance(
+            models, Iterable) and not isinstance(models, str) else [models]
         names = labels_of([_path_of(model) for model in several], bool(settings))
         chosen = dict(zip(names, several, strict=True))  # type: ignore[arg-type]
     if not chosen:
         raise CommandError('no model given')
+    if not all(isinstance(label, str) and label.strip() for label in chosen):
+        raise CommandError(f'labels of models must be words: {", ".join(map(repr, chosen))}')
     found = []
     for label, model in chosen.items():
         husky = Husky(as_husky(model), **settings)
@@ -320,7 +329,7 @@ def _path_of(model: Model | None) -> Path:
         if model.path:
             return Path(model.path)
         return default_model_path() if model.model == Husky().model else Path('model')
-    return default_model_path() if model is None else Path(model)
+    return default_model_path() if model is None else Path(as_husky(model).path)
 
 
 def _rival_label(rivals: Sequence[rec.Recording], place: int, taken: Sequence[str]) -> str:

@@ -181,15 +181,21 @@ def identify(husky: Husky, recordings: Recordings, free: Iterable[str] = (), *,
     check_count('starts', starts)
     check_count('jobs', jobs)
     recordings = given(recordings)
-    model = with_effects(husky.model, tuple(effects))
+    free, effects, nuisance, profiles = map(_names, (free, effects, nuisance, profiles))
+    model = with_effects(husky.model, effects)
     onset = model.structure.onset
     with shown(progress, known=False) as report:
         read, = rec.named_apart(rec.named_as_in(
             read_all(recordings, topics=topics, progress=report),
             () if onset is None else onset.recordings))
         parts = tuple(part for one in read for part in rec.segments(one))
-        result = estimate(model, parts, method=Method(method), free=tuple(free),
-                          nuisance=tuple(nuisance), profiles=tuple(profiles), seed=seed,
+        result = estimate(model, parts, method=Method(method), free=free,
+                          nuisance=nuisance, profiles=profiles, seed=seed,
                           starts=starts, jobs=jobs, scheduler=scheduler, baseline=husky.model,
                           progress=lambda word: report(f'fitting: {word}', None))
     return Fit(result, parts, husky, tuple((one.name, one.path) for one in read))
+
+
+def _names(several: Iterable[str]) -> tuple[str, ...]:
+    # A text is one name, not its letters.
+    return (several,) if isinstance(several, str) else tuple(several)

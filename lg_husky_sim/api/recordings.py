@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
+from numbers import Integral
 import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING, TypeAlias
@@ -18,6 +19,7 @@ from lg_husky_sim.errors import CommandError, RecordingError
 from lg_husky_sim.extras import require
 from lg_husky_sim.recording.bags import bags_in
 from lg_husky_sim.signals import TimeSeries
+from lg_husky_sim.yaml_files import shown
 import numpy as np
 
 if TYPE_CHECKING:
@@ -246,6 +248,8 @@ def topic_map(topics: Topics) -> rec.TopicMap:
     """Return topics chosen by hand as the reader takes them."""
     if isinstance(topics, rec.TopicMap):
         return topics
+    if not isinstance(topics, (Mapping, type(None))):
+        raise RecordingError(f'topics = {shown(topics)} is no mapping of roles to topics')
     return rec.TopicMap.parse(f'{role}={name}' for role, name in (topics or {}).items())
 
 
@@ -270,7 +274,7 @@ def read(path: PathLike, *, topics: Topics = None) -> Recording:
     RecordingError
         If there is no usable bag; the message says why.
     """
-    bags = bags_in(Path(path))
+    bags = bags_in(_place(path))
     if len(bags) > 1:
         names = ', '.join(bag.name for bag in bags[:5])
         raise RecordingError(f'{path} holds {len(bags)} recordings ({names}'
@@ -330,7 +334,7 @@ def given(source: Recordings) -> list[Path | rec.Recording]:
     return found
 
 
-def check_count(name: str, value: int) -> None:
+def check_count(name: str, value: object) -> None:
     """
     Check how many processes, threads or starts are asked for.
 
@@ -339,8 +343,8 @@ def check_count(name: str, value: int) -> None:
     CommandError
         If fewer than one.
     """
-    if value < 1:
-        raise CommandError(f'{name} = {value}: at least 1 is needed')
+    if not isinstance(value, Integral) or value < 1:
+        raise CommandError(f'{name} = {shown(value)}: at least 1 is needed')
 
 
 def listed(source: Recordings) -> list[Path | rec.Recording]:
@@ -352,14 +356,21 @@ def listed(source: Recordings) -> list[Path | rec.Recording]:
     RecordingError
         If a path does not exist.
     """
-    several: Iterable[PathLike | rec.Recording] = [source] if isinstance(
-        source, (str, os.PathLike, rec.Recording)) else source
+    several: Iterable[PathLike | rec.Recording] = source if isinstance(
+        source, Iterable) and not isinstance(source, str) else [source]
     found: list[Path | rec.Recording] = []
     for one in several:
         if isinstance(one, rec.Recording):
             found.append(one)
             continue
-        if not Path(one).exists():
+        place = _place(one)
+        if not place.exists():
             raise RecordingError(f'no recording {one}: there is no such file or folder')
-        found += bags_in(Path(one))
+        found += bags_in(place)
     return found
+
+
+def _place(path: object) -> Path:
+    if not isinstance(path, (str, os.PathLike)):
+        raise RecordingError(f'{shown(path)} is no recording, nor the path of one')
+    return Path(path)

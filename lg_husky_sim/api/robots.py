@@ -15,7 +15,7 @@ from lg_husky_sim.api.graphs import Graph
 from lg_husky_sim.api.progress import Shown
 from lg_husky_sim.api.recordings import PathLike, Recording, Recordings, Topics
 from lg_husky_sim.api.tables import page_part, Table
-from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.errors import ModelFileError, ParameterError
 from lg_husky_sim.husky import network
 from lg_husky_sim.husky.by_hand import Number as Number  # a public name, used here too
 from lg_husky_sim.husky.effects import check_distinct, Effect, Subsystem
@@ -74,6 +74,8 @@ class Husky(Graph):
             file, self.path = model.model, model.path
         elif isinstance(model, ModelFile):
             file, self.path = model, ''
+        elif not isinstance(model, (str, os.PathLike, type(None))):
+            raise ModelFileError(f'{shown(model)} is no model, nor the path of a model file')
         else:
             file, self.path = load_model(model), '' if model is None else os.fspath(model)
         if not (about is None or isinstance(about, str)):

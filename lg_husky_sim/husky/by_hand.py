@@ -14,10 +14,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 import math
-from numbers import Real
 
 from lg_husky_sim.errors import ParameterError
-from lg_husky_sim.husky.parameters import Parameter, Parameters
+from lg_husky_sim.husky.parameters import number_of, Parameter, Parameters
 from lg_husky_sim.husky.robot_size import HUSKY, RobotSize, size_of
 from lg_husky_sim.settings import numbers
 from lg_husky_sim.yaml_files import shown
@@ -78,12 +77,7 @@ class Number:
 
 
 def _finite(name: str, value: object, unit: str = '') -> float:
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise ParameterError(f'{name} = {shown(value)} is not a number')
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
+    number = number_of(name, value)
     if not math.isfinite(number):
         raise ParameterError(f'{name} = {number:g}{unit} is not a finite number')
     return number

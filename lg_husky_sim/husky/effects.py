@@ -277,9 +277,9 @@ class Effect:
         for what, value, allowed in (('side', self.side, kind.sides),
                                      ('shape', self.shape, kind.shapes)):
             if value not in allowed:
-                raise ParameterError(
-                    f'{what} {shown(value)} of effect {self.id} is not one of '
-                    f'{", ".join(allowed)}')
+                known = ', '.join(one for one in allowed if one not in ('', 'none'))
+                raise ParameterError(f'{what} {shown(value)} of effect {self.id} is not one of '
+                                     f'{known}' if known else f'{self.id} has no {what}s')
 
     @property
     def kind(self) -> EffectKind:
@@ -392,8 +392,9 @@ def effect_kind(name: str) -> EffectKind:
     known = {**catalogue(), **descriptions()}
     if name not in known:
         offered = catalogue()
-        near = difflib.get_close_matches(name, offered, n=1) or [
-            one for one, kind in offered.items() if name and (name in one or name in kind.name)]
+        word = str(name)
+        near = difflib.get_close_matches(word, offered, n=1) or [
+            one for one, kind in offered.items() if word and (word in one or word in kind.name)]
         hint = f'; did you mean {" or ".join(near)}?' if 0 < len(near) <= MOST_MEANT else ''
         raise ParameterError(f'unknown effect {shown(name)}{hint} (known: {", ".join(offered)})')
     return known[name]

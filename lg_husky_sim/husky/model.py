@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import enum
 from functools import lru_cache
 
-from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.errors import ParameterError, UnknownParameterError
 from lg_husky_sim.husky import network
 from lg_husky_sim.husky.command_lag import smooth_commands
 from lg_husky_sim.husky.command_lag import STATES as LAG_STATES
@@ -244,9 +244,9 @@ class HuskyModel:
         """
         try:
             sets = tuple(regime.at(parameters) for regime in self.regimes)
-        except KeyError as error:
+        except UnknownParameterError as error:
             raise ParameterError(
-                f'parameter {error.args[0]!r} is missing; the structure needs it') from error
+                f'parameter {error.name!r} is missing; the structure needs it') from error
         return Plant(sets, self.regimes[0].states, self.structure.onset)
 
 

@@ -26,7 +26,7 @@ from lg_husky_sim.husky.model import Drivetrain, Structure
 from lg_husky_sim.husky.model_schema import EFFECT, ONSET, PARAMETER, SCHEMA, STRUCTURE, TOP
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.husky.robot_size import HUSKY, RobotSize, size_of
-from lg_husky_sim.yaml_files import shown
+from lg_husky_sim.yaml_files import shown, wrong_schema
 
 MOST_ERRORS = 20
 """So many errors of a file are listed."""
@@ -63,8 +63,9 @@ def read_model(data: object, nominal: Parameters | None
     """
     errors: list[str] = []
     content = _mapping('the file', data)
-    if content.get('schema') != SCHEMA:
-        raise ModelFileError(f'schema is {shown(content.get("schema"))}, expected {SCHEMA!r}')
+    wrong = wrong_schema(content, SCHEMA)
+    if wrong:
+        raise ModelFileError(wrong)
     _known(errors, '', content, TOP['properties'])
     about = _tried(errors, lambda: _text('about', content.get('about'))) or ''
     drivetrain, onset = _structure(errors, content.get('structure', {}))

@@ -8,8 +8,27 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 import difflib
 import math
+from numbers import Real
 
-from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.errors import ParameterError, UnknownParameterError
+from lg_husky_sim.yaml_files import shown
+
+
+def number_of(name: str, value: object) -> float:
+    """
+    Return what a person gives as the value of a parameter.
+
+    Raises
+    ------
+    ParameterError
+        If it is no number.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ParameterError(f'{name} = {shown(value)} is not a number')
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 @dataclass(frozen=True)
@@ -92,7 +111,10 @@ class Parameters(Mapping[str, float]):
     def __getitem__(self, name: str) -> float:
         """Return the value of a parameter [its unit]."""
         values: dict[str, float] = self._values  # type: ignore[attr-defined]
-        return values[name]
+        try:
+            return values[name]
+        except KeyError:
+            raise self._unknown(name) from None
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names."""
@@ -108,16 +130,19 @@ class Parameters(Mapping[str, float]):
 
         Raises
         ------
-        ParameterError
+        UnknownParameterError
             If there is none of that name; a near name is suggested.
         """
         index: dict[str, int] = self._index  # type: ignore[attr-defined]
         if name not in index:
-            near = difflib.get_close_matches(name, index, n=1)
-            hint = f'; did you mean {near[0]}?' if near else ''
-            raise ParameterError(
-                f'unknown parameter {name!r}{hint} (known: {", ".join(index)})')
+            raise self._unknown(name)
         return self.entries[index[name]]
+
+    def _unknown(self, name: object) -> UnknownParameterError:
+        near = difflib.get_close_matches(str(name), self, n=1)
+        hint = f'; did you mean {near[0]}?' if near else ''
+        return UnknownParameterError(
+            f'unknown parameter {shown(name)}{hint} (known: {", ".join(self)})', str(name))
 
     def replacing(self, values: Mapping[str, float]) -> Parameters:
         """
@@ -131,10 +156,10 @@ class Parameters(Mapping[str, float]):
         Raises
         ------
         ParameterError
-            If a name is unknown or a value outside its bounds.
+            If a name is unknown, or a value is no number or outside its bounds.
         """
-        changed = {name: replace(self.entry(name), value=float(value), low=None, high=None)
-                   for name, value in values.items()}
+        changed = {name: replace(self.entry(name), value=number_of(name, value), low=None,
+                                 high=None) for name, value in values.items()}
         return Parameters(tuple(changed.get(e.name, e) for e in self.entries))
 
     def with_entries(self, *entries: Parameter) -> Parameters:

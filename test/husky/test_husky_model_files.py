@@ -72,14 +72,15 @@ def test_every_bit_of_a_number_comes_back(tmp_path: Path) -> None:
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path,
                                             monkeypatch: pytest.MonkeyPatch) -> None:
     place = tmp_path / 'model.yaml'
-    place.write_text('the old one')
+    save_model(load_model(), place)
+    old = place.read_text()
 
     def fail(*_: object, **__: object) -> None:
         raise OSError('no space')
     monkeypatch.setattr(yaml, 'dump', fail)
     with pytest.raises(OSError, match='no space'):
         save_model(load_model(), place)
-    assert place.read_text() == 'the old one'
+    assert place.read_text() == old
     assert list(tmp_path.iterdir()) == [place]
 
 
@@ -104,7 +105,7 @@ def without(key: str) -> Callable[[dict[str, Any]], None]:
 SLOPED = [{'effect': 'slope', 'parameters': {'slope_x': 3.0}}]
 HOSTILE: list[tuple[Callable[[dict[str, Any]], None], str]] = [
     (put('schema', 'another/1'), "schema is 'another/1', expected 'lg_husky_sim/model/1'"),
-    (put('schema', None), 'schema is None, expected'),
+    (put('schema', None), 'schema is missing, expected'),
     (put('colour', 'red'), "unknown key 'colour'"),
     (put('parameters', [1, 2]), 'parameters is not a mapping of names'),
     (put('parameters', None), 'parameters is not a mapping of names'),
