@@ -31,6 +31,7 @@ def check_graph(graph: LinearGraph) -> None:
     _check_masses(graph)
     _check_across_loops(graph)
     _check_characteristics(graph)
+    _check_inputs(graph)
 
 
 def check_complete(graph: LinearGraph) -> None:
@@ -86,6 +87,19 @@ def _check_names(graph: LinearGraph) -> None:
             raise GraphError(f'the name {name!r} is used twice; every branch and two-port needs '
                              'a name of its own')
         seen.add(name)
+
+
+def _check_inputs(graph: LinearGraph) -> None:
+    first: dict[str, Branch] = {}
+    for source in graph.of_kind(*SOURCES):
+        if source.characteristic is not None:
+            continue
+        one = first.setdefault(source.input_name, source)
+        if (one.kind, one.domain) != (source.kind, source.domain):
+            raise GraphError(
+                f'sources {one.name!r} ({one.domain.value} {one.kind.value}) and {source.name!r} '
+                f'({source.domain.value} {source.kind.value}) share the input '
+                f'{source.input_name!r}, but not its unit; give each its own')
 
 
 def _check_nodes(graph: LinearGraph) -> None:
@@ -176,10 +190,13 @@ def _check_through_cuts(graph: LinearGraph) -> None:
                 part = forest.find(node)
                 cut = [e.name for e in sources
                        if (forest.find(e.tail) == part) != (forest.find(e.head) == part)]
-                raise GraphError(
+                sources_say = (
+                    f'through source {cut[0]} alone connects node {node[1]!r}, so its flow has '
+                    'no other way' if len(cut) == 1 else
                     f'through sources {", ".join(cut)} alone connect node {node[1]!r}, so they '
-                    'may contradict each other and its across variable is open; put another '
-                    'element in parallel')
+                    'may contradict each other')
+                raise GraphError(f'{sources_say} and the across variable is open; put another '
+                                 'element in parallel')
 
 
 def _check_open_ends(graph: LinearGraph) -> None:

@@ -41,7 +41,7 @@ def why_no_name(text: object) -> str:
     """Return why the text cannot name a parameter, an input or an element; '' if it can."""
     if not (isinstance(text, str) and text.isascii() and text.isidentifier()
             and not text.startswith('__')):
-        return 'must be letters, digits and underscores, and not start with a digit'
+        return 'must be ASCII letters, digits and underscores, and not start with a digit'
     if keyword.iskeyword(text):
         return 'is a reserved word; choose another name'
     if text in CONSTANTS:

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+import math
 from pathlib import Path
 import re
 from typing import Any
@@ -43,11 +44,12 @@ from lg_husky_sim.linear_graph.elements import (
     TwoPort,
 )
 from lg_husky_sim.linear_graph.expressions import names_in, why_no_name
-from lg_husky_sim.linear_graph.graph import GROUND, LinearGraph, suggestion
+from lg_husky_sim.linear_graph.graph import close_name, GROUND, LinearGraph, suggestion
 from lg_husky_sim.linear_graph.netlist_schema import (
     ELEMENTS,
     LONGEST_TEXT,
     ONE_PORT,
+    OTHER_WORDS,
     PORT,
     QUANTITY,
     TOP,
@@ -57,6 +59,8 @@ from lg_husky_sim.linear_graph.units import check_units, parse_unit, unit_needed
 
 Ground = str | dict[Domain, str]
 _QUANTITY = re.compile(QUANTITY, re.ASCII)
+CLOSE = 0.8
+"""Likeness from which on an unknown element is taken for a slip of the pen."""
 
 
 @dataclass(frozen=True)
@@ -180,8 +184,8 @@ def _netlist(data: Any) -> Netlist:
             element = _element(name, given, values, units, ground)
         except (GraphError, ModelFileError) as error:
             message = str(error)
-            raise ModelFileError(message if repr(name) in message else
-                                 f'element {name!r}: {message}') from error
+            named = re.match(rf'(?!unit )([\w-]+ ){{0,2}}{re.escape(repr(name))}', message)
+            raise ModelFileError(message if named else f'element {name!r}: {message}') from error
         if isinstance(element, Branch):
             branches.append(element)
         else:
@@ -227,10 +231,11 @@ def _element(name: str, given: Any, values: dict[str, float], units: dict[str, s
         return two_port if law else replace(
             two_port, value=_value(entry, two_port, values, units))
     if what not in ELEMENTS:
-        raise ModelFileError(f'is: {what!r} is not an element'
-                             f'{suggestion(what, (*ELEMENTS, *two_ports))}')
+        raise ModelFileError(f'is: {what!r} is not an element{_meant(what)}')
     _known(entry, f'element {name!r}', ONE_PORT['properties'])
     kind, domain = ELEMENTS[what]
+    if 'from' not in entry:
+        _node(entry, 'from', None)
     form = None
     if 'form' in entry:
         forms = {form.value: form for form in Form}
@@ -248,6 +253,14 @@ def _element(name: str, given: Any, values: dict[str, float], units: dict[str, s
                       _text(given if isinstance(given, str) else str(given), 'value'))
     branch = Branch(name, kind, domain, tail, head, '1', form)
     return replace(branch, value=_value(entry, branch, values, units))
+
+
+def _meant(what: str) -> str:
+    """Return the word for an element that is known by another one, or all words."""
+    if word := OTHER_WORDS.get(what.lower()):
+        return f'; write {word}'
+    known = (*ELEMENTS, *(kind.value for kind in TWO_PORT_KINDS))
+    return close_name(what, known, cutoff=CLOSE) or f'; there are {", ".join(known)}'
 
 
 def _value(entry: Mapping[str, Any], draft: Branch | TwoPort, values: dict[str, float],
@@ -272,11 +285,19 @@ def _quantity(given: Any, what: str) -> tuple[float, str]:
     if isinstance(given, bool) or not isinstance(given, int | float | str):
         raise ModelFileError(f"{what} must be a number with a unit, such as '0.5 ohm'")
     match = _QUANTITY.fullmatch(str(given))
+    if isinstance(given, float) and not math.isfinite(given):
+        raise ModelFileError(f'{what} is not finite, or beyond 1e308')
+    if match is not None and re.match(r'[*/+\-]', match.group(2)):
+        raise ModelFileError(f'{what} = {given!r} must be a number; expressions stand in the '
+                             'values of elements')
     if match is None:
         raise ModelFileError(f'{what} = {given!r} must be a number with a unit, '
                              "such as '0.5 ohm'")
     number, unit = float(match.group(1)), match.group(2)
-    scaled = number * parse_unit(unit).scale
+    try:
+        scaled = number * parse_unit(unit).scale
+    except GraphError as error:
+        raise ModelFileError(f'{what}: {error}') from error
     if not abs(scaled) < 1e300:
         raise ModelFileError(f'{what} = {given!r} is too large')
     return scaled, unit
@@ -321,8 +342,11 @@ def _node(entry: Mapping[str, Any], key: str, default: str | None) -> str:
     given = entry.get(key, default)
     if isinstance(given, int) and not isinstance(given, bool):
         return str(given)
+    if key not in entry and given is None:
+        raise ModelFileError(f'{key} is missing; it names a node' + (
+            ' (there is form: in place of from:)' if key == 'from' and 'form' in entry else ''))
     if not isinstance(given, str):
-        raise ModelFileError(f'{key} must name a node')
+        raise ModelFileError(f'{key}: {given!r} is no text; put the name of the node in quotes')
     return given
 
 
@@ -331,7 +355,8 @@ def _mapping(given: Any, what: str, known: Collection[str] | None) -> Mapping[st
         raise ModelFileError(f'{what} must be entries of the form key: value')
     for key in given:
         if not isinstance(key, str):
-            raise ModelFileError(f'{what}: key {key!r} must be a text')
+            raise ModelFileError(f'{what}: key {key!r} must be a text; put it in quotes (on, yes, '
+                                 'off and no are read as true and false)')
     if known is not None:
         _known(given, what, known)
     return given

@@ -30,6 +30,23 @@ _EVERYDAY: Mapping[Domain, Mapping[str, Kind]] = {
         'heat capacity': Kind.A_TYPE, 'thermal resistance': Kind.D_TYPE}}
 ELEMENTS: Mapping[str, tuple[Kind, Domain]] = {
     name: (kind, domain) for domain, names in _EVERYDAY.items() for name, kind in names.items()}
+OTHER_WORDS: Mapping[str, str] = {
+    'accumulator': 'tank', 'fluid capacitor': 'tank', 'fluid capacitance': 'tank',
+    'hydraulic capacitor': 'tank', 'reservoir': 'tank', 'pipe': 'inertance, valve, or both',
+    'fluid inertia': 'inertance', 'fluid inductor': 'inertance', 'fluid inertance': 'inertance',
+    'orifice': 'valve', 'fluid resistor': 'valve', 'fluid resistance': 'valve',
+    'pump': 'flow source, pressure source, or gyrator', 'cylinder': 'gyrator', 'ram': 'gyrator',
+    'piston': 'gyrator', 'gear': 'transformer', 'gears': 'transformer', 'lever': 'transformer',
+    'motor': 'transformer', 'flywheel': 'inertia', 'rotor': 'inertia',
+    'rotational inertia': 'inertia', 'moment of inertia': 'inertia', 'shaft': 'torsion spring',
+    'rotary spring': 'torsion spring', 'bearing': 'rotary damper', 'dashpot': 'damper',
+    'friction': 'damper or rotary damper', 'battery': 'voltage source', 'conductor': 'resistor',
+    'conductance': 'resistor', 'coil': 'inductor', 'resistance': 'resistor',
+    'capacitance': 'capacitor', 'inductance': 'inductor', 'diode': 'resistor with a law',
+    'thermal capacitance': 'heat capacity', 'thermal capacitor': 'heat capacity',
+    'thermal mass': 'heat capacity', 'thermal resistor': 'thermal resistance',
+    'thermal conductance': 'thermal resistance', 'heater': 'heat source'}
+"""What to write for a word that is none of the elements."""
 LONGEST_TEXT = 2000
 #: A number with or without a unit.
 QUANTITY = r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*'

@@ -9,8 +9,8 @@ Angles count as pure numbers, so N·m·s/rad and N·m·s are one unit; rad/(N·m
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 import math
 import re
@@ -54,11 +54,13 @@ _NO_PREFIX: Mapping[str, tuple[float, Dimension]] = {
     'min': (60.0, _dimension(0, 0, 1, 0, 0)), 'h': (3600.0, _dimension(0, 0, 1, 0, 0)),
     'deg': (math.pi / 180.0, PURE), 'rpm': (math.pi / 30.0, _dimension(0, 0, -1, 0, 0)),
     'degC': (1.0, _dimension(0, 0, 0, 0, 1))}
-_PREFIXES = {'p': 1e-12, 'n': 1e-9, 'u': 1e-6, 'm': 1e-3, 'c': 1e-2, 'k': 1e3, 'M': 1e6,
-             'G': 1e9}
+_PREFIXES = {'f': 1e-15, 'p': 1e-12, 'n': 1e-9, 'u': 1e-6, 'm': 1e-3, 'c': 1e-2, 'd': 1e-1,
+             'h': 1e2, 'k': 1e3, 'M': 1e6, 'G': 1e9, 'T': 1e12}
 _ALIASES = {'\u03a9': 'ohm', '\u2126': 'ohm',
-            'Ohm': 'ohm', '°C': 'degC', '°': 'deg', 'µ': 'u', 'μ': 'u', '²': '**2', '³': '**3',
-            '⁻¹': '**-1', '·': '*', '⋅': '*', '×': '*', '^': '**', '−': '-'}
+            'Ohm': 'ohm', '°C': 'degC', '°': 'deg', 'µ': 'u', 'μ': 'u', '·': '*', '⋅': '*',
+            '∙': '*', '×': '*', '^': '**', '−': '-'}
+_RAISED = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
+_WORDS = {'cc': 'cm³', 'sec': 's', 'kgs': 'kg'}
 
 _ACROSS_UNIT = {Domain.ELECTRICAL: 'V', Domain.TRANSLATIONAL: 'm/s', Domain.ROTATIONAL: 'rad/s',
                 Domain.FLUID: 'Pa', Domain.THERMAL: 'K'}
@@ -107,7 +109,9 @@ def parse_unit(text: str) -> Unit:
     plain = text.strip() or '1'
     for alias, replacement in _ALIASES.items():
         plain = plain.replace(alias, replacement)
-    plain = re.sub(r'(?<=[\w)])\s+(?=[\w(])', '*', plain)
+    plain = re.sub('[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+', lambda power: f'**{power.group().translate(_RAISED)}', plain)
+    plain = re.sub(r'([A-Za-z])(\d+)\b', r'\1**\2', plain)             # m2
+    plain = re.sub(r'(?<=[\w)])(?:\s+|[-.])(?=[A-Za-z(])', '*', plain)  # kg m, kg.m, N-m
     if plain == 'degC':
         raise GraphError(f'unit {shown}: temperatures are given from absolute zero or as '
                          'differences; write K')
@@ -123,6 +127,8 @@ def _unit_of(node: ast.expr, shown: str) -> tuple[float, Dimension]:
     if isinstance(node, ast.Name):
         if (found := _named(node.id)) is not None:
             return found
+        if node.id in _PREFIXES:
+            raise GraphError(f'unit {shown}: {node.id!r} is a prefix without a unit')
         if meant := _meant(node.id):
             raise GraphError(f'unit {shown}: {node.id!r} is not a known unit; did you mean '
                              f'{meant!r}?')
@@ -155,8 +161,13 @@ def _named(name: str) -> tuple[float, Dimension] | None:
 
 def _meant(name: str) -> str:
     """Return a unit that may be meant: a product without its dot, or other capitals."""
+    if word := _WORDS.get(name) or (name[:-1] if name.endswith('s') and len(name) > 3 and _named(
+            name[:-1]) else ''):
+        return word
     capitals = [name[0].lower() + name[1:], name[0] + name[1:].upper(), name[0].upper() + name[1:]]
     products = [_product(name, plain=True), _product(name, plain=False)]
+    if products[0].count('·') > 1 and products[0][0] in _PREFIXES:     # mN·m
+        products[0] = products[0].replace('·', '', 1)
     order = [*capitals, *products] if name[0] == 'K' else [products[0], *capitals, products[1]]
     return next((text for text in order if '·' in text or (text and _named(text))), '')
 
@@ -229,7 +240,7 @@ def check_units(graph: LinearGraph, units: Mapping[str, str]) -> tuple[str, ...]
     elements: list[Branch | TwoPort] = [*graph.branches, *graph.two_ports]
     for element in elements:
         if element.unit:
-            _compare(element, parse_unit(element.unit).dimension, element.unit)
+            _compare(element, parse_unit(element.unit).dimension, element.unit, [element.unit])
         law = element.characteristic
         if law is None and isinstance(element, Branch) and element.kind in SOURCES:
             continue
@@ -250,7 +261,8 @@ def check_units(graph: LinearGraph, units: Mapping[str, str]) -> tuple[str, ...]
         except GraphError as error:
             raise GraphError(f'element {element.name!r}, {shown}: {error}') from error
         of_units = ', '.join(f'{name} [{units[name]}]' for name in names)
-        _compare(element, found, f'{shown} with {of_units}')
+        _compare(element, found, f'{shown} with {of_units}' if names else shown,
+                 [units[name] for name in names])
     return tuple(unchecked)
 
 
@@ -268,10 +280,12 @@ def _variable(graph: LinearGraph, text: str) -> Dimension:
     return parse_unit(unit_of(graph, text)).dimension
 
 
-def _compare(element: Branch | TwoPort, found: Dimension, shown: str) -> None:
+def _compare(element: Branch | TwoPort, found: Dimension, shown: str, given: Sequence[str]
+             ) -> None:
     needed = unit_needed(element)
     expected = parse_unit(needed).dimension
     if found == expected:
+        _refuse_hertz(element, given)
         return
     what = element.kind.value
     form = ''
@@ -279,11 +293,28 @@ def _compare(element: Branch | TwoPort, found: Dimension, shown: str) -> None:
         what = f'{element.domain.value} {what}'
         form = f' ({element.given_form.value})' if element.given_form else ''
     hint = ''
-    if found == tuple(-power for power in expected):
+    if isinstance(element, Branch) and element.characteristic is not None and form:
+        other = Form.RESISTANCE if element.is_damping else Form.DAMPING
+        if parse_unit(unit_needed(replace(element, form=other))).dimension == found:
+            hint = f'; it fits with form: {other.value}'
+    elif found == tuple(-power for power in expected):
         hint = '; it is the inverse, so invert the value' + (
             ' or choose the other form' if form else '')
+    elif len(given) == 1 and (parts := re.fullmatch('([^/()]+)/([^/()]+)/([^/()]+)', given[0])):
+        meant = '{}/({}/{})'.format(*parts.groups())
+        hint = f'; write {meant}' if parse_unit(meant).dimension == expected else ''
     raise GraphError(f'unit of {element.name!r}: {shown} does not fit {article(what)}{form}, '
                      f'which needs {needed}{hint}')
+
+
+def _refuse_hertz(element: Branch | TwoPort, given: Sequence[str]) -> None:
+    """Refuse Hz in rotation, where it may be a turn or a radian in a second."""
+    domains = {element.domain} if isinstance(element, Branch) else {
+        element.port1[0], element.port2[0]}
+    for unit in given:
+        if Domain.ROTATIONAL in domains and 'Hz' in unit:
+            raise GraphError(f'unit of {element.name!r}: {unit} may mean turns or radians in a '
+                             'second; write rad/s, or rpm for turns in a minute')
 
 
 def dimension_of(node: ast.expr, known: Mapping[str, Dimension]) -> Dimension:

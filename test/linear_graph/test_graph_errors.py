@@ -70,6 +70,12 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         build(*RC, branch('I_1', Kind.THROUGH_SOURCE, 'b', 'c'),
               branch('I_2', Kind.THROUGH_SOURCE, 'c')),
         r"through sources I_1, I_2 alone connect node 'c'.*in parallel"),
+    'one through source alone': (
+        build(branch('I_1', Kind.THROUGH_SOURCE, 'c'), *RC),
+        r"through source I_1 alone connects node 'c', so its flow has no other way and the"),
+    'one input of two units': (
+        build(*RC, Branch('I', Kind.THROUGH_SOURCE, E, 'b', 'ground', 'V')),
+        r"sources 'V' \(electrical across source\) and 'I' .* share the input 'V', but not its"),
     'sources in contradiction through a transformer': (
         build(*RC, source('V_2', 'd'), two_ports=(transformer('n', 'a', 'd'),)),
         r"source 'V_2' cannot set V\(V_2\): it is already fixed by V;.*put a D-type between"),

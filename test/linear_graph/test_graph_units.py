@@ -31,6 +31,8 @@ def husky_units() -> dict[str, str]:
 @pytest.mark.parametrize(('one', 'other'), [
     ('N·m·s/rad', 'kg*m^2/s'), ('V', 'W/A'), ('ohm', 'Ω'), ('H', 'V*s/A'), ('F', 'A·s/V'),
     ('Pa·s²/m³', 'kg/m^4'), ('J/K', 'W s/K'), ('N/m', 'kg/s**2'), ('N·m/A', 'V·s/rad'),
+    ('kg.m^2', 'kg·m²'), ('N.m/rad', 'N·m/rad'), ('N-m/rad', 'N·m/rad'), ('kg m2', 'kg·m²'),
+    ('m3/Pa', 'm³/Pa'), ('N·m·s⁻²', 'N*m/s**2'), ('m⁵/N', 'm^5/N'), ('kg∙m²', 'kg·m²'),
     ('1', 'rad'), ('m³/Pa', 'm^5/N'), ('S', '1/ohm'), ('', 'rad/rad'), ('Wb', 'V s'),
 ])
 def test_two_ways_to_write_one_unit(one: str, other: str) -> None:
@@ -42,7 +44,7 @@ def test_two_ways_to_write_one_unit(one: str, other: str) -> None:
     ('mH', 1e-3), ('µF', 1e-6), ('kN/m', 1e3), ('g·cm²', 1e-7), ('kPa·s/m³', 1e3), ('mm', 1e-3),
     ('MPa', 1e6), ('1/ms', 1e3), ('mL', 1e-6), ('mbar', 100.0), ('L/min', 1e-3 / 60.0),
     ('V/rpm', 30.0 / pi), ('deg/s', pi / 180.0), ('°', pi / 180.0), ('A·h', 3600.0),
-    ('W/°C', 1.0),
+    ('W/°C', 1.0), ('hPa', 100.0), ('dm³', 1e-3), ('TPa', 1e12), ('fF', 1e-15),
 ])
 def test_prefixes_scale(text: str, scale: float) -> None:
     assert parse_unit(text).scale == pytest.approx(scale, rel=1e-12)
@@ -57,7 +59,8 @@ def test_what_is_no_unit_is_refused(text: str) -> None:
 
 
 @pytest.mark.parametrize(('text', 'meant'), [
-    ('Nm', 'N·m'), ('Nms/rad', 'N·m·s'), ('KΩ', 'kohm'), ('Kg', 'kg'), ('mh', 'mH'),
+    ('Nm', 'N·m'), ('mNm', 'mN·m'), ('ohms', 'ohm'), ('kohms', 'kohm'), ('cc', 'cm³'),
+    ('Nms/rad', 'N·m·s'), ('KΩ', 'kohm'), ('Kg', 'kg'), ('mh', 'mH'),
     ('kw', 'kW'), ('kgm²', 'kg·m')])
 def test_a_unit_that_may_be_meant_is_suggested(text: str, meant: str) -> None:
     with pytest.raises(GraphError, match=f"is not a known unit; did you mean '{meant}'"):
@@ -159,3 +162,32 @@ def test_unlike_things_are_not_added() -> None:
     with pytest.raises(GraphError, match=r"element 'm', m \+ J: m and J have different units"):
         check_units(graph, {'m': 'kg', 'J': 'kg·m²'})
     assert check_units(graph, {'m': 'kg', 'J': 'g'}) == ()
+
+
+@pytest.mark.parametrize('unit', ['N·m/Hz', 'N·m/kHz'])
+def test_hertz_are_refused_in_rotation(unit: str) -> None:
+    """1 Hz would be 1 rad/s or 6.28 rad/s; elsewhere it is 1/s."""
+    damper = Branch('B', Kind.D_TYPE, Domain.ROTATIONAL, 'n', 'ground', 'B')
+    with pytest.raises(GraphError, match=f"'B': {unit} may mean turns or radians in a second"):
+        check_units(LinearGraph((damper,)), {'B': unit})
+    coil = Branch('L', Kind.T_TYPE, Domain.ELECTRICAL, 'n', 'ground', 'L')
+    assert check_units(LinearGraph((coil,)), {'L': 'ohm/Hz'}) == ()
+
+
+def test_what_would_fit_is_said() -> None:
+    damper = Branch('B', Kind.D_TYPE, Domain.ROTATIONAL, 'n', 'ground', 'B')
+    with pytest.raises(GraphError, match=r'needs N·m·s/rad; write N·m/\(rad/s\)$'):
+        check_units(LinearGraph((damper,)), {'B': 'N·m/rad/s'})
+    valve = Branch('O', Kind.D_TYPE, Domain.FLUID, 'n', 'ground',
+                   characteristic=Characteristic('orifice', ('P(O)',), ('k', 'e')))
+    with pytest.raises(GraphError, match=r'which needs Pa; it fits with form: damping$'):
+        check_units(LinearGraph((valve,)), {'k': 'm³/(s·Pa**0.5)', 'e': 'Pa'})
+    cubic = Branch('F', Kind.THROUGH_SOURCE, Domain.TRANSLATIONAL, 'n', 'ground',
+                   characteristic=Characteristic('z**3', ('v(F)',)))
+    with pytest.raises(GraphError, match=r'its law z\*\*3 does not fit'):
+        check_units(LinearGraph((cubic,)), {})
+
+
+def test_a_prefix_is_no_unit() -> None:
+    with pytest.raises(GraphError, match="'k' is a prefix without a unit"):
+        parse_unit('k')

@@ -1,0 +1,46 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Words and slips of a netlist that another word or a quotation mark would mend."""
+
+from __future__ import annotations
+
+import lg_husky_sim as lg
+from lg_husky_sim.errors import LgHuskyError
+import pytest
+
+NETS: dict[str, tuple[str, str]] = {
+    'pipe': ('elements: {p: {is: pipe, from: a}}', "'pipe' is not an element; write inertance"),
+    'flywheel': ('elements: {f: {is: Flywheel, from: a}}', 'not an element; write inertia$'),
+    'thermal capacitance': ('elements: {c: {is: thermal capacitance, from: a}}',
+                            'not an element; write heat capacity$'),
+    'fluid capacitor': ('elements: {c: {is: fluid capacitor, from: a}}', 'write tank$'),
+    'conductor': ('elements: {c: {is: conductor, from: a}}', 'write resistor$'),
+    'slip': ('elements: {r: {is: resitor, from: a}}', "did you mean 'resistor'"),
+    'any': ('elements: {r: {is: thing, from: a}}', 'there are voltage source, .* tank, .*gyrator'),
+    'node on': ('elements: {r: {is: resistor, from: on}}',
+                "element 'r': from: True is no text; put the name of the node in quotes"),
+    'node number': ('elements: {r: {is: resistor, from: 1.5}}', 'from: 1.5 is no text'),
+    'element on': ('elements: {on: {is: resistor, from: a}}',
+                   'key True must be a text; put it in quotes'),
+    'form for from': ('elements: {r: {is: resistor, form: a}}',
+                      r'from is missing; it names a node \(there is form: in place of from:\)'),
+    'parameter with an expression': (
+        'parameters: {d: 2*c}\nelements: {r: {is: resistor, from: a, value: d}}',
+        r"parameter d = '2\*c' must be a number; expressions stand in the values of elements"),
+    'parameter with a wrong unit': (
+        'parameters: {d: 2 psi}\nelements: {r: {is: resistor, from: a, value: d}}',
+        "parameter d: unit 'psi'"),
+    'number too large': ('elements: {r: {is: resistor, from: a, value: 1e400}}',
+                         "element 'r': value is not finite, or beyond 1e308"),
+    'unit of the name of the element': ('elements: {R: {is: resistor, from: a, value: 1 R}}',
+                                        "element 'R': value: unit 'R'"),
+    'letters of Greece': ('elements: {R_α: {is: resistor, from: a, value: 1}}',
+                          'must be ASCII letters'),
+}
+
+
+@pytest.mark.parametrize('name', NETS)
+def test_the_remedy_is_said(name: str) -> None:
+    text, message = NETS[name]
+    with pytest.raises(LgHuskyError, match=message):
+        lg.graph(text)
