@@ -188,8 +188,9 @@ def checked_rate(rate: object) -> float:
         If it is not positive or too high.
     """
     if not isinstance(rate, Real) or not 0.0 < float(rate) <= LARGEST_RATE:
+        said = f'{float(rate):g}' if isinstance(rate, Real) else shown(rate)
         raise CommandError(
-            f'rate = {shown(rate)} Hz must be positive and at most {LARGEST_RATE:g} Hz')
+            f'rate = {said} Hz must be positive and at most {LARGEST_RATE:g} Hz')
     return float(rate)
 
 

@@ -20,6 +20,21 @@ outputs: [v(M)]
 """
 
 
+@pytest.mark.parametrize('verb', [
+    ['info', 'x'], ['simulate', '--commands', 'circle', '--out', 'x'],
+    ['compare', 'x', '--out', 'x'], ['identify', 'x', '--out', 'x.yaml'],
+    ['diagnose', 'x', '--out', 'x'], ['evaluate', '--out', 'x']])
+@pytest.mark.parametrize(('option', 'said'), [
+    (['--set', 'mass'], "--set 'mass' is not of the form NAME=VALUE with a number (see lg_husky "),
+    (['--set', 'mass=abc'], "--set 'mass=abc' is not of the form NAME=VALUE"),
+    (['--set', 'mass=60', '--set', 'mass=70'], "--set 'mass=70': mass is given twice"),
+    (['--topic', 'foo'], "topic choice 'foo' must be ROLE=NAME with ROLE one of command, ")])
+def test_a_choice_that_cannot_be_understood_ends_with_2(
+        verb: list[str], option: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([*verb, *option]) == 2
+    assert said in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(('arguments', 'said'), [
     (['schema', 'modle'],
      "'modle' is not one of graph, model, commands, sim_node; did you mean model?"),

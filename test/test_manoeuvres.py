@@ -76,7 +76,7 @@ def test_a_script_is_read(tmp_path: Path) -> None:
     (HEAD + 'steps: [{duration: true}]', 'duration = True is not a number'),
     (HEAD + 'steps: [{duration: 1, forward: .nan}]', 'forward = nan is not finite'),
     (HEAD + 'steps: [{duration: 1, yaw: 900}]', r'yaw = 900 rad/s is beyond ±100 rad/s'),
-    (HEAD + 'rate: 0\nsteps: [{duration: 1}]', 'rate = 0.0 Hz must be positive'),
+    (HEAD + 'rate: 0\nsteps: [{duration: 1}]', 'rate = 0 Hz must be positive'),
     (HEAD + 'rate: 1000\nsteps: [{duration: 90000}]', 'is too long'),
     (HEAD + 'steps: [{duration: 1', 'not YAML'),
 ])

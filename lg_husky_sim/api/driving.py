@@ -47,7 +47,7 @@ def driven(plant: Plant, values: Mapping[str, float], commands: Drive, rate: flo
     Raises
     ------
     CommandError
-        If the commands cannot be used.
+        If the commands cannot be used, or the rate is too low for two samples.
     RecordingError
         If the recording cannot be read or has no commands.
     """
@@ -57,7 +57,7 @@ def driven(plant: Plant, values: Mapping[str, float], commands: Drive, rate: flo
     recording = _recording(plant, commands, topics)
     if recording is not None:
         frames = recording.frames if recording.frames[0] else ('odom', 'base_link')
-        streams = simulate_recording(plant, recording, torque, rate or 0.0)
+        streams = _sampled(simulate_recording(plant, recording, torque, rate or 0.0), rate)
         _, left_out = rec.driven_segments(recording)
         notes = () if not left_out else (
             f'{left_out} of {len(recording.stream("command"))} commands are not driven: no state '
@@ -65,8 +65,14 @@ def driven(plant: Plant, values: Mapping[str, float], commands: Drive, rate: flo
         return Recording(recording.name, '', streams, recording.start_ns,
                          frames=frames, notes=notes)
     name, series = _series(commands, topics)
-    streams = simulate_commands(plant, series, torque, rate or DEFAULT_RATE)
+    streams = _sampled(simulate_commands(plant, series, torque, rate or DEFAULT_RATE), rate)
     return Recording(name, '', streams, START_NS, frames=('odom', 'base_link'))
+
+
+def _sampled(streams: dict[str, TimeSeries], rate: float | None) -> dict[str, TimeSeries]:
+    if rate and len(streams['pose']) < 2:
+        raise CommandError(f'rate = {rate:g} Hz gives a single sample of the whole drive')
+    return streams
 
 
 def fastest_side(commands: TimeSeries, values: Mapping[str, float]) -> float:

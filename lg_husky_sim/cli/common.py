@@ -17,6 +17,8 @@ import click
 from click.shell_completion import CompletionItem
 
 if TYPE_CHECKING:
+    from lg_husky_sim.recording import TopicMap
+
     _TextType = click.ParamType[str]
     _ChoiceType = click.Choice[str]
 else:
@@ -254,18 +256,38 @@ COMMANDS = Words(_manoeuvres, files=True)
 MODEL = click.Path(path_type=Path)
 
 
+def _topics(context: click.Context, _: click.Parameter, given: tuple[str, ...]) -> TopicMap:
+    from lg_husky_sim.errors import RecordingError
+    from lg_husky_sim.recording import TopicMap
+    try:
+        return TopicMap.parse(given)
+    except RecordingError as error:
+        raise click.UsageError(str(error), context) from error
+
+
+def _settings(context: click.Context, _: click.Parameter, given: tuple[str, ...]
+              ) -> dict[str, float]:
+    from lg_husky_sim.errors import ParameterError
+    from lg_husky_sim.husky.model_file import parse_settings
+    try:
+        return parse_settings(given)
+    except ParameterError as error:
+        raise click.UsageError(str(error), context) from error
+
+
 def topics_option(function: Function) -> Function:
-    """Add ``--topic``."""
+    """Add ``--topic``; the verb gets a ``TopicMap``."""
     return click.option(
-        '--topic', 'topics', multiple=True, metavar='ROLE=NAME […]', type=TOPIC,
+        '--topic', 'topics', multiple=True, metavar='ROLE=NAME […]', type=TOPIC, callback=_topics,
         help='Choose a topic or frame of the recordings by hand (command=/cmd_vel, …).',
     )(function)
 
 
 def settings_option(function: Function) -> Function:
-    """Add ``--set``."""
+    """Add ``--set``; the verb gets a dict of floats."""
     return click.option(
         '--set', 'settings', multiple=True, metavar='NAME=VALUE […]', type=SETTING,
+        callback=_settings,
         help='Override physical parameters.')(function)
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from lg_husky_sim.cli.common import (
@@ -16,6 +17,9 @@ from lg_husky_sim.cli.common import (
     topics_option,
 )
 from lg_husky_sim.cli.several import SeveralWords
+
+if TYPE_CHECKING:
+    from lg_husky_sim.recording import TopicMap
 
 
 @click.command(cls=SeveralWords,
@@ -46,7 +50,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @spoken(page=True)
 def command(
     recordings: tuple[str, ...], models: tuple[Path, ...], out: Path, rivals: tuple[str, ...],
-    settings: tuple[str, ...], topics: tuple[str, ...], horizon: float, most: int,
+    settings: dict[str, float], topics: TopicMap, horizon: float, most: int,
     bag: Path | None, trajectories: Path | None, say: Output,
 ) -> None:
     """
@@ -59,8 +63,6 @@ def command(
     """
     from lg_husky_sim.api.comparing import compare
     from lg_husky_sim.folders import check_folder
-    from lg_husky_sim.husky.model_file import parse_settings
-    from lg_husky_sim.recording import TopicMap
     from lg_husky_sim.recording.writer import check_target
     from lg_husky_sim.reporting.write import check_extras
 
@@ -71,7 +73,7 @@ def command(
     with say.stages() as report:
         comparison = compare(
             recordings, models or None, rivals=rivals, horizon=horizon,
-            settings=parse_settings(settings), topics=TopicMap.parse(topics), progress=report)
+            settings=settings, topics=topics, progress=report)
         page = comparison.save(out, most, report)
     if bag is not None:
         comparison.save_bag(bag)

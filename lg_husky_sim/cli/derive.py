@@ -19,7 +19,7 @@ PAPER = ('simplified', 'expanded')
 @click.command(short_help='Derive the state-space model of a linear graph; draw and export it.')
 @click.argument('graph', required=False, metavar='[GRAPH]', type=Words(lambda: PAPER, files=True))
 @click.option('--model', metavar='GRAPH', type=Words(lambda: PAPER, files=True),
-              help='The same as the argument, as other verbs have it.')
+              help='Another way to give GRAPH, as in other verbs.')
 @click.option('--output', 'outputs', multiple=True, metavar='VARIABLE',
               help="An output variable, such as 'i(L_1)'; may be given several times.")
 @click.option('--parameters', 'by_parameter', is_flag=True,
@@ -41,9 +41,9 @@ def command(graph: str | None, model: str | None, outputs: tuple[str, ...],
     GRAPH is a netlist, a model file or one of the paper's two graphs of the Husky, simplified
     (the default) or expanded.
 
-    Normal tree, continuity, compatibility and constitutive equations, then A, B, C and D (E and F
-    if an input is differentiated, G, H and K if laws are not linear), and, given numbers, numeric
-    matrices and poles.
+    The steps are the normal tree, the continuity, compatibility and constitutive equations, and
+    the matrices A, B, C and D. There are E and F if an input is differentiated, and G, H and K if
+    laws are not linear. Where all parameters have numbers, matrices in numbers and poles follow.
     """
     import json
 
@@ -76,6 +76,6 @@ def _load(model: str, outputs: tuple[str, ...]) -> Graph:
     if model in PAPER:
         return graph(model, outputs)
     path = Path(model)
-    if path.suffix not in ('.yaml', '.yml'):
+    if path.suffix.lower() not in ('.yaml', '.yml'):
         raise ModelFileError(f'model {model!r} must be {", ".join(PAPER)} or a .yaml file')
     return graph(path, outputs)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from lg_husky_sim.cli.common import (
@@ -16,6 +17,9 @@ from lg_husky_sim.cli.common import (
     topics_option,
 )
 from lg_husky_sim.cli.several import SeveralWords
+
+if TYPE_CHECKING:
+    from lg_husky_sim.recording import TopicMap
 
 
 @click.command(cls=SeveralWords,
@@ -39,7 +43,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @spoken(page=True)
 def command(
     recordings: tuple[str, ...], out: Path, baselines: tuple[str, ...], robot: Path | None,
-    settings: tuple[str, ...], topics: tuple[str, ...], seed: int, jobs: int | None,
+    settings: dict[str, float], topics: TopicMap, seed: int, jobs: int | None,
     with_report: bool, say: Output,
 ) -> None:
     """
@@ -51,8 +55,6 @@ def command(
     """
     from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.folders import check_folder
-    from lg_husky_sim.husky.model_file import parse_settings
-    from lg_husky_sim.recording import TopicMap
     from lg_husky_sim.reporting.provenance import given_command
     from lg_husky_sim.reporting.write import check_extras
 
@@ -60,11 +62,11 @@ def command(
     check_folder(out)
     if with_report:
         check_extras()
-    husky = Husky(robot, **parse_settings(settings))
+    husky = Husky(robot, **settings)
     with say.stages() as report:
         found = husky.diagnose(
             recordings, baseline=baselines, jobs=jobs,
-            topics=TopicMap.parse(topics), progress=report)
+            topics=topics, progress=report)
         try:
             report('report and pictures' if with_report else 'files', 0.95)
             page = found.save(out, with_report, given_command(),

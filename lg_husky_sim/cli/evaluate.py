@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from lg_husky_sim.cli.common import (
@@ -16,6 +17,9 @@ from lg_husky_sim.cli.common import (
     topics_option,
 )
 from lg_husky_sim.cli.several import SeveralWords
+
+if TYPE_CHECKING:
+    from lg_husky_sim.recording import TopicMap
 
 
 @click.command(cls=SeveralWords,
@@ -49,7 +53,7 @@ from lg_husky_sim.cli.several import SeveralWords
 def command(
     out: Path, cases: tuple[str, ...], calibrate: tuple[str, ...], held_out: tuple[str, ...],
     rivals: tuple[str, ...], steps: tuple[str, ...], model: Path | None,
-    settings: tuple[str, ...], seed: int, starts: int, jobs: int, topics: tuple[str, ...],
+    settings: dict[str, float], seed: int, starts: int, jobs: int, topics: TopicMap,
     say: Output,
 ) -> None:
     """
@@ -65,13 +69,7 @@ def command(
     from lg_husky_sim.evaluation.session import Request, run_evaluation
     from lg_husky_sim.folders import check_folder
     from lg_husky_sim.husky.by_hand import other_robot
-    from lg_husky_sim.husky.model_file import (
-        apply_settings,
-        load_model,
-        packaged,
-        parse_settings,
-    )
-    from lg_husky_sim.recording import TopicMap
+    from lg_husky_sim.husky.model_file import apply_settings, load_model, packaged
     from lg_husky_sim.reporting.provenance import provenance
     from lg_husky_sim.reporting.write import check_extras
 
@@ -79,7 +77,7 @@ def command(
     check_folder(out)
     if (held_out or rivals) and not calibrate:
         raise CommandError('--held-out and --rival need --calibrate REC')
-    start = apply_settings(load_model(model), parse_settings(settings))
+    start = apply_settings(load_model(model), settings)
     chosen = cases
     if (cases or not (calibrate or steps)) and other_robot(packaged().parameters,
                                                            start.parameters):
@@ -92,7 +90,7 @@ def command(
         if len(chosen) == 1:
             say.remark('without the case engine: it needs MuJoCo, pip install mujoco')
     request = Request(chosen, calibrate, held_out, rivals, steps, start, seed, starts, jobs,
-                      TopicMap.parse(topics))
+                      topics)
     with say.stages(known=False) as report:
         found = run_evaluation(
             request, out, lambda word: report(f'evaluating: {word}', None), provenance(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from lg_husky_sim.cli.common import (
@@ -20,6 +21,9 @@ from lg_husky_sim.cli.common import (
     topics_option,
 )
 from lg_husky_sim.cli.several import SeveralWords
+
+if TYPE_CHECKING:
+    from lg_husky_sim.recording import TopicMap
 
 
 @click.command(cls=SeveralWords,
@@ -61,10 +65,10 @@ from lg_husky_sim.cli.several import SeveralWords
 @topics_option
 @spoken(page=True)
 def command(
-    recordings: tuple[str, ...], out: Path, model: Path | None, settings: tuple[str, ...],
+    recordings: tuple[str, ...], out: Path, model: Path | None, settings: dict[str, float],
     free: tuple[str, ...], effects: tuple[str, ...], method: str, nuisance: tuple[str, ...],
     profile: tuple[str, ...], seed: int, starts: int, jobs: int, scheduler: str | None,
-    each: bool, topics: tuple[str, ...], say: Output,
+    each: bool, topics: TopicMap, say: Output,
 ) -> None:
     """
     Estimate the parameters of a model from recordings.
@@ -74,17 +78,14 @@ def command(
     for all bags in it.
     """
     from lg_husky_sim.api.robots import Husky
-    from lg_husky_sim.husky.model_file import parse_settings
     from lg_husky_sim.identification.options import names_in
     from lg_husky_sim.identification.report import report_paths
-    from lg_husky_sim.recording import TopicMap
     from lg_husky_sim.reporting.write import check_extras
 
     check_extras()
     if not each:
         report_paths(out)
-    husky = Husky(model, **parse_settings(settings))
-    choice = TopicMap.parse(topics)
+    husky = Husky(model, **settings)
     with say.stages(known=False) as report:
         if each:
             from lg_husky_sim.identification.options import with_effects
@@ -93,7 +94,7 @@ def command(
             from lg_husky_sim.recording.bags import bags_in
             request = Request(
                 with_effects(husky.model, effects), husky.model, Method(method), names_in(free),
-                names_in(nuisance), names_in(profile), seed, starts, choice)
+                names_in(nuisance), names_in(profile), seed, starts, topics)
             paths = [str(bag) for path in recordings for bag in bags_in(Path(path))]
             table, results = fit_each(request, paths, out, jobs, scheduler,
                                       lambda word: report(f'fitting: {word}', None))
@@ -102,7 +103,7 @@ def command(
         fit = husky.identify(
             recordings, names_in(free), effects=effects, method=method,
             nuisance=names_in(nuisance), profiles=names_in(profile), seed=seed, starts=starts,
-            jobs=jobs, scheduler=scheduler, topics=choice, progress=report)
+            jobs=jobs, scheduler=scheduler, topics=topics, progress=report)
         files = fit.save(out)
     say.result(fit, fit.data())
     say.remark('\nwritten: ' + ', '.join(str(path) for path in files[:-1]))

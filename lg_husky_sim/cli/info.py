@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from lg_husky_sim.cli.common import (
@@ -17,6 +18,9 @@ from lg_husky_sim.cli.common import (
 )
 from lg_husky_sim.cli.several import SeveralWords
 
+if TYPE_CHECKING:
+    from lg_husky_sim.recording import TopicMap
+
 
 @click.command(cls=SeveralWords,
                short_help='Show what recordings contain and are good for, before any fit.')
@@ -25,8 +29,8 @@ from lg_husky_sim.cli.several import SeveralWords
 @settings_option
 @topics_option
 @spoken()
-def command(recordings: tuple[str, ...], model: Path | None, settings: tuple[str, ...],
-            topics: tuple[str, ...], say: Output) -> None:
+def command(recordings: tuple[str, ...], model: Path | None, settings: dict[str, float],
+            topics: TopicMap, say: Output) -> None:
     """
     Show what recordings contain and what they are good for, before any fit.
 
@@ -36,13 +40,11 @@ def command(recordings: tuple[str, ...], model: Path | None, settings: tuple[str
     """
     from lg_husky_sim.api.recordings import read_all
     from lg_husky_sim.api.robots import Husky
-    from lg_husky_sim.husky.model_file import parse_settings
-    from lg_husky_sim.recording import TopicMap
 
-    husky = Husky(model, **parse_settings(settings))
+    husky = Husky(model, **settings)
     surveys = []
     with say.stages() as report:
-        for recording in read_all(recordings, topics=TopicMap.parse(topics), progress=report):
+        for recording in read_all(recordings, topics=topics, progress=report):
             report(f'looking at {recording.name}', None)
             surveys.append(recording.info(husky))
     if say.as_json:

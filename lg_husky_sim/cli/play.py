@@ -5,21 +5,25 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+from lg_husky_sim.cli.common import topics_option
 from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, RosVerb, say
+
+if TYPE_CHECKING:
+    from lg_husky_sim.recording import TopicMap
 
 
 @click.command(cls=RosVerb, short_help='Play a recording into the ROS graph.', epilog=ROS_HELP)
 @click.argument('recording', type=click.Path(path_type=Path), metavar='REC')
 @robot_options
-@click.option('--topic', 'topics', multiple=True, metavar='ROLE=NAME […]',
-              help='Choose a topic of the recording by hand (command=/cmd_vel, …).')
+@topics_option
 @click.option('--speed', default=1.0, show_default=True, type=click.FloatRange(0.01, 100.0),
               help='Speed of playing, as a multiple of the recorded one.')
 @click.option('--wait', default=10.0, show_default=True, metavar='SECONDS',
               type=click.FloatRange(min=0.0), help='How long to wait for a subscriber.')
-def command(recording: Path, preset: str | None, namespace: str | None, topics: tuple[str, ...],
+def command(recording: Path, preset: str | None, namespace: str | None, topics: TopicMap,
             speed: float, wait: float) -> None:
     """
     Send command, joint states, IMU and odometry of a recording, stamped now.
@@ -28,11 +32,11 @@ def command(recording: Path, preset: str | None, namespace: str | None, topics: 
     first. The subscribing nodes are printed first, commands stay within the limits of the preset,
     and zero commands are sent last, however it ends.
     """
-    from lg_husky_sim.recording import read_recording, TopicMap
+    from lg_husky_sim.recording import read_recording
     from lg_husky_sim.ros.player import NAME, play
     from tqdm import tqdm
 
-    read = read_recording(recording, TopicMap.parse(topics))
+    read = read_recording(recording, topics)
     longest = max(series.times[-1] for series in read.streams.values() if len(series))
     with ros_tool(NAME, preset, namespace, wait=wait) as (tool, settings), \
             tqdm(total=round(float(longest), 2), desc=read.name, disable=None,

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from lg_husky_sim.cli.common import (
@@ -16,6 +17,9 @@ from lg_husky_sim.cli.common import (
     topics_option,
 )
 from lg_husky_sim.cli.several import SeveralWords
+
+if TYPE_CHECKING:
+    from lg_husky_sim.recording import TopicMap
 
 
 @click.command(cls=SeveralWords,
@@ -36,7 +40,7 @@ from lg_husky_sim.cli.several import SeveralWords
 @spoken()
 def command(
     model: Path | None, commands: str, out: Path, storage: str, rate: float | None,
-    settings: tuple[str, ...], topics: tuple[str, ...], overwrite: bool, say: Output,
+    settings: dict[str, float], topics: TopicMap, overwrite: bool, say: Output,
 ) -> None:
     """
     Drive a model with commands and write what its sensors read as a rosbag2.
@@ -47,13 +51,11 @@ def command(
     """
     from lg_husky_sim.api.driving import fastest_side
     from lg_husky_sim.api.robots import Husky
-    from lg_husky_sim.husky.model_file import parse_settings
-    from lg_husky_sim.recording import TopicMap
     from lg_husky_sim.recording.writer import check_target
 
     check_target(out, overwrite=overwrite)
-    husky = Husky(model, **parse_settings(settings))
-    driven = husky.simulate(commands, rate=rate, topics=TopicMap.parse(topics))
+    husky = Husky(model, **settings)
+    driven = husky.simulate(commands, rate=rate, topics=topics)
     driven.save(out, storage=storage, overwrite=overwrite)
     x, y, heading = (float(value) for value in driven.pose.values[-1])
     seconds = float(driven.pose.times[-1] - driven.pose.times[0])

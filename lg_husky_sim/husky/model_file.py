@@ -169,11 +169,13 @@ def parse_settings(pairs: tuple[str, ...]) -> dict[str, float]:
     Raises
     ------
     ParameterError
-        If a text is not of that form.
+        If a text is not of that form, or a name is given twice.
     """
     settings = {}
     for pair in pairs:
         name, equals, value = pair.partition('=')
+        if name.strip() in settings:
+            raise ParameterError(f'--set {shown(pair)}: {name.strip()} is given twice')
         try:
             settings[name.strip()] = float(value)
         except ValueError:

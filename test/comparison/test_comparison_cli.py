@@ -127,7 +127,7 @@ def test_simulate_says_where_a_slower_robot_stays_behind(tmp_path: Path, capsys:
     (['--commands', 'circle', '--out', '.'], '. exists already'),
     (['--commands', 'circle', '--out', 'x', '--rate', '0'], 'rate = 0 Hz must be positive'),
     (['--commands', 'circle', '--out', 'x', '--rate', 'nan'], 'rate = nan Hz must be positive'),
-    (['--commands', 'circle', '--out', 'x', '--set', 'mass'], "--set 'mass' is not of the form"),
+    (['--commands', 'circle', '--out', 'x', '--rate', '1e-9'], 'rate = 1e-09 Hz gives a single'),
     (['--commands', 'circle', '--out', 'x', '--set', 'mas=2'], 'did you mean mass'),
     (['--commands', 'circle', '--out', 'x', '--set', 'mass=-2'], 'mass = -2 kg is not positive'),
     (['--commands', 'circle', '--out', 'x', '--topic', 'imu=/a'], 'topics can only be chosen for'),

@@ -96,6 +96,8 @@ def test_settings_of_the_command_line() -> None:
     for text in ('mass', 'mass=', 'mass=heavy', '=3', 'mass=1,5'):
         with pytest.raises(ParameterError, match='is not of the form NAME=VALUE'):
             parse_settings((text,))
+    with pytest.raises(ParameterError, match='mass is given twice'):
+        parse_settings(('mass=50', ' mass=60'))
     for text in ('model=3', 'about=1', 'self=2'):
         with pytest.raises(ParameterError, match='is no parameter'):
             parse_settings((text,))
