@@ -286,7 +286,7 @@ def test_results_show_themselves_in_notebooks(drive: Path) -> None:
     recording = lg.read(drive)
     for shown_result in (recording, recording.info(), lg.Husky(), lg.compare(drive)):
         assert '<table>' in shown_result._repr_html_()
-    assert r'\frac{d}{dt}' in lg.Husky()._repr_latex_()
+    assert r'\frac{d}{dt}' in str(lg.Husky()._repr_latex_())
 
 
 def test_drawing_needs_the_right_number_of_axes(drive: Path) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from numbers import Real
 import os
 from pathlib import Path
 import re
@@ -65,7 +66,7 @@ class Graph(Responses):
                  outputs: Sequence[str] = (), note: str = '', source: str = '') -> None:
         """Keep what the matrices are derived from when they are first asked for."""
         self.name, self.graph, self.values = name, graph, dict(values)
-        self.outputs, self.note, self.source = tuple(outputs), note, source
+        self.outputs, self.note, self.source = _listed(outputs), note, source
 
     @contextmanager
     def _in_file(self) -> Iterator[None]:
@@ -164,10 +165,13 @@ class Graph(Responses):
             laws = model.structure.laws.values()
             known = dict.fromkeys((*model.parameters, *(p for law in laws for p in law.parameters),
                                    *self.values))
-            for name in values:
+            given: dict[str, object] = {**values}
+            for name, value in given.items():
                 if name not in known:
                     raise ParameterError(f'unknown parameter {name!r} '
                                          f'(known: {", ".join(known)})')
+                if isinstance(value, bool) or not isinstance(value, Real):
+                    raise ParameterError(f'parameter {name!r} = {value!r} must be a number, SI')
             return model.at({**self.values, **values})
 
     def text(self, by_parameter: bool = False) -> str:
@@ -287,13 +291,19 @@ class Graph(Responses):
         return (f'<{type(self).__name__} {self.name}: {len(self.graph.branches)} branches'
                 f'{"; ".join(forms)}>')
 
-    def _repr_latex_(self) -> str:
+    def _repr_latex_(self) -> str | None:
         from lg_husky_sim.linear_graph.report import state_equation_latex
 
-        return f'${state_equation_latex(self.symbolic)}$'
+        try:
+            return f'${state_equation_latex(self.symbolic)}$'
+        except LgHuskyError:        # which the page says
+            return None
 
     def _repr_html_(self) -> str:
-        model = self.symbolic
+        try:
+            model = self.symbolic
+        except LgHuskyError as error:
+            return page_part(self.name, [*[self.note] * bool(self.note), str(error)], [])
         variables = Table('', ('', 'names'), (
             ('states x', ', '.join(model.states)), ('inputs u', ', '.join(model.inputs)),
             ('outputs y', ', '.join(model.outputs))))
@@ -345,6 +355,17 @@ def graph(source: str | os.PathLike[str] | dict[str, Any] | LinearGraph,
     return _of_file(Path(source), outputs)
 
 
+def _listed(outputs: Sequence[str]) -> tuple[str, ...]:
+    """Return outputs, checked to be a list without repetitions."""
+    if isinstance(outputs, str):
+        raise GraphError(f'outputs = {outputs!r} must be a list, such as [{outputs!r}]')
+    found = tuple(outputs)
+    for name in found:
+        if found.count(name) > 1:
+            raise GraphError(f'output {name!r} is named twice')
+    return found
+
+
 def _of_netlist(netlist: Netlist, outputs: Sequence[str], source: str = '') -> Graph:
     return Graph(netlist.name, netlist.graph, netlist.values, outputs or netlist.outputs,
                  netlist.about, source)
@@ -364,5 +385,5 @@ def _of_file(path: Path, outputs: Sequence[str]) -> Graph:
         return _of_netlist(read_netlist(path), outputs, str(path))
     from lg_husky_sim.api.robots import Husky
     husky = Husky(path)
-    husky.outputs = tuple(outputs) or husky.outputs
+    husky.outputs = _listed(outputs) or husky.outputs
     return husky

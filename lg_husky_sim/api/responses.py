@@ -10,7 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.api.curves import FrequencyResponse, StepResponse
 from lg_husky_sim.api.transfer_functions import root_text, TransferFunction, warn_of
-from lg_husky_sim.errors import GraphError
+from lg_husky_sim.errors import GraphError, ParameterError
 from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, StateSpace
 from lg_husky_sim.linear_graph.state_space import FloatArray
 import numpy as np
@@ -72,9 +72,12 @@ class Responses(ABC):
             If a name is unknown, an element is called ``s``, or the answer in symbols would fill
             hundreds of pages.
         ParameterError
-            In numbers, if a parameter has no number or one that is not allowed.
+            In numbers, if a parameter has no number or one that is not allowed, or
+            `by_parameter` is asked for.
         """
         output, source = self._names(output, source)
+        if by_parameter and (numbers or values):
+            raise ParameterError('by_parameter is for symbols; leave it or the numbers out')
         if numbers or values:
             return self._in_numbers(output, source, values)
         from lg_husky_sim.linear_graph.transfer import transfer_function
@@ -221,9 +224,13 @@ class Responses(ABC):
     def _names(self, output: str, source: str) -> tuple[str, str]:
         """Return the names of an output and an input; one that is alone need not be given."""
         from lg_husky_sim.linear_graph.transfer import position
+        for name in (output, source):
+            if not isinstance(name, str):
+                raise GraphError(f'{name!r} must be the name of an output or an input')
         model = compile_numeric(self.graph, self.outputs, chained=True)
         source = model.inputs[position(model.inputs, source, 'input')]
         if not output:
+            self._first_output()
             return model.outputs[position(model.outputs, '', 'output')], source
         try:        # any variable of the graph will do
             return self.graph.variable(output).name, source

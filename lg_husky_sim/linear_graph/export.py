@@ -15,7 +15,7 @@ from typing import Any
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.extras import require
 from lg_husky_sim.folders import check_marked, scratch_beside
-from lg_husky_sim.linear_graph.state_space import FloatArray, MATRICES, StateSpace
+from lg_husky_sim.linear_graph.state_space import equation_forms, FloatArray, MATRICES, StateSpace
 import numpy as np
 
 SCHEMA = 'lg_husky_sim/state_space/1'
@@ -170,8 +170,7 @@ def check_export(path: Path) -> None:
 def json_text(space: StateSpace, name: str, parameters: Mapping[str, float]) -> str:
     """Return a model as JSON, schema ``lg_husky_sim/state_space/1``."""
     data = {'schema': SCHEMA, 'name': name,
-            'equations': 'dx/dt = A x + B u + E du/dt + G f(z), z = H x + K u + N f(z), '
-                         'y = C x + D u + F du/dt + L_c f(z)',
+            'equations': ', '.join(equation_forms(space)),
             **{key: list(getattr(space, key)) for key in _NAMES},
             **{key: matrix.tolist() for key, matrix in used_matrices(space).items()},
             'parameters': dict(parameters)}

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import lg_husky_sim as lg
-from lg_husky_sim.errors import GraphError, ModelFileError
+from lg_husky_sim.errors import GraphError, ModelFileError, ParameterError
 from lg_husky_sim.linear_graph import Branch, derive, Domain, Kind, LinearGraph
 from lg_husky_sim.linear_graph.netlist import parse_netlist
 import pytest
@@ -30,14 +32,14 @@ outputs: [P(C), Q(out)]
 
 
 def test_the_formula_of_a_notebook_has_the_rate_of_change_of_an_input() -> None:
-    shown = lg.graph(DIVIDER)._repr_latex_()
+    shown = str(lg.graph(DIVIDER)._repr_latex_())
     assert (r'\begin{bmatrix}\frac{C_{2}}{C_{1} + C_{2}}\end{bmatrix} '
             r'\frac{d}{dt} \begin{bmatrix} V_{s} \end{bmatrix}') in shown
     assert (shown[0], shown[-1], shown.count('$')) == ('$', '$', 2)
 
 
 def test_the_formula_of_a_notebook_has_laws_that_are_not_linear() -> None:
-    shown = lg.graph(TANK)._repr_latex_()
+    shown = str(lg.graph(TANK)._repr_latex_())
     assert (r'\begin{bmatrix}- \frac{1}{C}\end{bmatrix} \begin{bmatrix} f_{\mathrm{out}} '
             r'\end{bmatrix}') in shown
     assert r'\begin{bmatrix} P_{C} \end{bmatrix} &= \begin{bmatrix}1\end{bmatrix}' in shown
@@ -96,7 +98,7 @@ def test_a_name_means_one_thing_in_graphs_made_in_python() -> None:
     ('sin', 'is a function of expressions; choose another name'),
     ('lambda', 'is a reserved word; choose another name'),
     ('nan', 'is no finite number and no name; write a number or another name'),
-    ('a-b', 'must be letters, digits and underscores, and not start with a digit')])
+    ('a-b', 'must be ASCII letters, digits and underscores, and not start with a digit')])
 def test_names_that_mean_something_else_are_refused(name: str, why: str) -> None:
     resistor = f'{name}: {{is: resistor, from: a, to: b, value: 1}}'
     with pytest.raises(ModelFileError, match=f"^netlist: element name '{name}' {why}$"):
@@ -109,7 +111,7 @@ def test_names_that_mean_something_else_are_refused(name: str, why: str) -> None
 
 
 @pytest.mark.parametrize(('value', 'why'), [
-    ('nan', "'nan' is no finite number"), ('.nan', 'nan must be a number with a unit'),
+    ('nan', "'nan' is no finite number"), ('.nan', 'value is not finite, or beyond 1e308'),
     ('2*inf', "'inf' is no finite number"), ('2*lambda', "'lambda' is a reserved word"),
     ('q^2', r'write \*\* in place of \^ for a power')])
 def test_values_that_are_none_are_refused_in_plain_words(value: str, why: str) -> None:
@@ -143,3 +145,35 @@ def test_only_elements_that_have_a_form_are_told_to_change_it() -> None:
     """
     with pytest.raises(ModelFileError, match=r'it is the inverse, so invert the value$'):
         parse_netlist(text)
+
+
+def test_values_that_are_no_numbers_are_refused() -> None:
+    values: list[Any] = ['3 ohm', None, 1j, [1.0], True]
+    for value in values:
+        with pytest.raises(ParameterError, match=r"parameter 'R' = .* must be a number, SI"):
+            lg.graph(DIVIDER).poles(R=value)
+
+
+def test_outputs_are_a_list_of_different_ones() -> None:
+    text: Any = 'V(C_2)'
+    with pytest.raises(GraphError, match=r"outputs = 'V\(C_2\)' must be a list, such as \['V\(C"):
+        lg.graph(DIVIDER, text)
+    with pytest.raises(GraphError, match=r"output 'V\(C_2\)' is named twice"):
+        lg.graph(DIVIDER, ['V(C_2)', 'V(C_2)'])
+
+
+def test_a_transfer_function_asks_for_names_and_one_form() -> None:
+    one: Any = 1
+    graph = lg.graph(DIVIDER)
+    with pytest.raises(GraphError, match='1 must be the name of an output or an input'):
+        graph.transfer_function(one, one)
+    with pytest.raises(ParameterError, match='by_parameter is for symbols'):
+        graph.transfer_function('V(C_2)', numbers=True, by_parameter=True)
+    with pytest.raises(GraphError, match="no output; name one, such as output='v"):
+        lg.graph(DIVIDER.partition('outputs')[0]).transfer_function()
+
+
+def test_a_notebook_says_why_a_graph_cannot_be_derived() -> None:
+    broken = lg.graph(DIVIDER, ['V(Q)'])
+    assert broken._repr_latex_() is None
+    assert 'no branch &#x27;Q&#x27;' in broken._repr_html_()

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from lg_husky_sim.cli.main import run
@@ -226,3 +227,16 @@ def test_a_constant_without_a_value_is_one_line(
     assert shown.err == (f"error: {path}: branch 'R': expression '1/0' cannot be evaluated: "
                          'division by zero\n')
     assert shown.out == ''
+
+
+def test_json_has_the_equations_that_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(['derive', 'simplified', '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['equations'] == (
+        'dx/dt = A x + B u, y = C x + D u')
+
+
+def test_capital_endings_will_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'MOTOR.YAML'
+    path.write_text('elements: {C: {is: capacitor, from: a}, R: {is: resistor, from: a}}', 'utf-8')
+    assert run(['derive', str(path), '--quiet']) == 0
+    assert 'State-space model' in capsys.readouterr().out
