@@ -9,18 +9,19 @@ from dataclasses import replace
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.diagnose import diagnose
-from lg_husky_sim.diagnosis.evidence.base_clock import at_ticks, ticking
+from lg_husky_sim.diagnosis.evidence.base_clock import at_ticks, ticked_as, ticking
 from lg_husky_sim.diagnosis.evidence.command_steps import steps_of
-from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.drives import Clock, Drive, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, Noise
-from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.point import beginning, Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, start_of, tick_unknowns
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.diagnosis.selection import recalibration
+from lg_husky_sim.diagnosis.selection import recalibration, search
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
-from lg_husky_sim.diagnosis.selection.ticks import ticks_are_likelier
+from lg_husky_sim.diagnosis.selection.ticks import ticked, ticks_are_likelier
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
@@ -107,6 +108,44 @@ def test_the_period_of_a_base_is_found_from_two_drives(
     quiet = evidence_of(drives, ['one', 'two'], start, replace(guess, values={
         **guess.values, 'command_jitter': 1e-4}), pool)
     assert ticking(quiet, quiet.fit(start, rounds=1)) == []
+
+
+def test_ticks_are_tried_again_with_what_was_found(
+        made: Made, pool: Threads, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Here a gyro's factor; with it, but not before, they are accepted."""
+    whole = made('one', PERIOD, 1)
+    imu = whole.streams['imu']
+    factor = np.where(np.array(imu.names) == 'yaw_rate', 1.08, 1.0)
+    scaled = TimeSeries(imu.times, factor * imu.values, imu.names)
+    drives = drives_of([replace(whole, streams={**whole.streams, 'imu': scaled})])
+    model = load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    first = evidence_of(drives, ['one'], start, first_guess(drives), pool)
+    ticks = [ticked_as(drive, [replace(drive, clock=Clock(PERIOD, 0.011, 0.0))])
+             for drive in drives]
+    wrong = next(h for h in hypotheses(start.structure) if h.effect.id == 'gyro_scale')
+    monkeypatch.setattr(search, 'ticking', lambda *_: [ticks])
+    for module in (search, recalibration):
+        monkeypatch.setattr(module, 'hypotheses', lambda structure: [wrong] if not (
+            structure.effects) else [])
+    tried = []
+
+    def at(known: recalibration.Recalibrated, point: Point, rivals: Sequence[Sequence[Drive]]
+           ) -> recalibration.Recalibrated | None:
+        tried.append(len(point.structure.effects))
+        if not point.structure.effects:
+            return None
+        evidence, fit = calibrated(*ticked(known.first, point, rivals[0]), 1)
+        return recalibration.Recalibrated(
+            evidence, fit, recalibration.Logged(fit), evidence, fit)
+    monkeypatch.setattr(search, 'at_ticks', at)
+    found = search.search(first, start, lambda *_: None)
+    assert tried == [0, 1]
+    assert [d.clock.period for d in found.evidence.drives if d.clock] == [PERIOD] * len(drives)
+    assert [one.effect.id for one in found.found] == ['gyro_scale']
+    assert found.final.point.values['gyro_factor'] == pytest.approx(1.08, abs=0.01)
+    assert found.plain.point.unknowns[-1].name == 'tick_delay one'
 
 
 def test_delays_of_single_steps_are_those_to_the_next_tick(made: Made) -> None:

@@ -112,7 +112,7 @@ def at_ticks(known: Recalibrated, start: Point, rivals: Sequence[Sequence[Drive]
     known : Recalibrated
         With commands that are applied as they come.
     start : Point
-        The nominal model.
+        The nominal model, with the effects that were found.
     rivals : sequence of sequence of Drive
         With commands at ticks of one rate or another.
 

@@ -39,7 +39,6 @@ from lg_husky_sim.diagnosis.selection.rounds import (
     Tried,
     with_jitter,
 )
-from lg_husky_sim.diagnosis.selection.ticks import ticked, ticks_of_found
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -202,6 +201,13 @@ def as_usual(point: Point) -> Point:
     return replace(point, reading=Reading(), unknowns=unknowns, places=places)
 
 
+def _having(initial: Point, final: Point, found: Sequence[Hypothesis]) -> Point:
+    # The initial point with effects as they were fitted, all else as it begins.
+    for one in found:
+        initial = one.point(initial, {p.name: final.values[p.name] for p in one.free})
+    return initial
+
+
 def _without_the_dropped(rounds: Sequence[Round], found: Sequence[Hypothesis],
                          kept: Sequence[Hypothesis]) -> list[Round]:
     # There is always one that says what was looked at last, adopted or not.
@@ -234,7 +240,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         other = at_ticks(known, start, rivals)
         if other is not None:
             known, rivals = other, []
-    evidence, base, first = known.evidence, known.base, known.first
+    evidence, base, initial = known.evidence, known.base, start
     seeds = seeds_of(known.first, known.rough, base, known.logged)
     otherwise = None
     if seeds and seeds[0].fit.point.reading != base.point.reading:
@@ -284,11 +290,13 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             base = one.base
             break
         found.append(best.hypothesis)
-        evidence, base = _settled(evidence, best.fit.point, first)
-        late = ticks_of_found(first, evidence, base, rivals) if rivals else None
-        if late is not None:
-            evidence, base, rivals, ticks = late.evidence, late.fit, [], True
-            first, _ = ticked(first, base.point, late.drives)
+        evidence, base = _settled(evidence, best.fit.point, known.first)
+        # What was found may have distorted the robot with and without ticks: they are tried again.
+        other = at_ticks(replace(known, evidence=evidence, base=base), _having(
+            initial, base.point, found), rivals) if rivals else None
+        if other is not None:
+            known, rivals, ticks = other, [], True
+            evidence, base, postponed = other.evidence, other.base, True
             plain = evidence.fit(with_effects(plain.point, base.point, []))
         if postponed or base.point.reading != usual:
             evidence, base = _read_as(evidence, base, best_reading(evidence, base))

@@ -22,7 +22,6 @@ from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import start_of, tick_unknowns
-from lg_husky_sim.diagnosis.selection.nominal import is_distorted
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.diagnosis.settings import setting
 import numpy as np
@@ -82,30 +81,6 @@ def near_ticks(first: Evidence, plain: tuple[Evidence, Fit], start: Point,
     if not ticks_are_likelier(plain, near, rivals[best]):
         return None
     return Ticked(rivals[best], *near)
-
-
-def ticks_of_found(first: Evidence, evidence: Evidence, base: Fit,
-                   rivals: Sequence[Sequence[Drive]]) -> Ticked | None:
-    """
-    Return a model with the effects that were found at ticks, if these are likelier than none.
-
-    Parameters
-    ----------
-    first : Evidence
-        Under a first guess of the noise.
-    evidence : Evidence
-    base : Fit
-        With these effects, of commands that are applied as they come.
-    rivals : sequence of sequence of Drive
-        With commands at ticks of one rate or another.
-
-    Returns
-    -------
-    Ticked or None
-        None where the robot's numbers are distorted still, too.
-    """
-    found = near_ticks(first, (evidence, base), base.point, rivals)
-    return None if found is None or is_distorted(found.fit) else found
 
 
 def ticks_are_likelier(plain: tuple[Evidence, Fit], ticked: tuple[Evidence, Fit],
