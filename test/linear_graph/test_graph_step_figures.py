@@ -4,14 +4,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import lg_husky_sim as lg
-from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.errors import ParameterError, SettingsError
+from lg_husky_sim.linear_graph import compile_numeric
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+EXAMPLES = Path(__file__).resolve().parents[2] / 'examples' / 'linear_graph'
 MOTOR = """
 elements:
   V: {is: voltage source, from: a}
@@ -162,3 +165,25 @@ def test_unequal_times_of_a_fast_system_are_refused() -> None:
         lg.graph(RC).step([0.0, 1e-9, 5e-9, 6e-9])
     np.testing.assert_allclose(lg.graph(RC).step([0.0, 1e-9]).values[:, 0],
                                [0.0, 1.0 - np.exp(-1.0)])
+
+
+@pytest.mark.parametrize('name', sorted(path.stem for path in EXAMPLES.glob('*.yaml')))
+def test_figures_of_examples_agree_with_their_samples(name: str) -> None:
+    """Modes from exact poles and zeros against the matrix exponential."""
+    graph = lg.graph(EXAMPLES / f'{name}.yaml')
+    needed = compile_numeric(graph.graph, graph.outputs, chained=True).parameters
+    missing = {name: 1.0 for name in needed if name not in graph.values}
+    for source in graph.inputs:
+        for output in graph.outputs:
+            try:
+                found = graph.step(output=output, source=source, **missing)
+            except SettingsError:       # it begins with an impulse
+                continue
+            final, rise, settling, _, peak, peak_time = row(found)
+            values, times = found.values[:, 0], found.times
+            if peak is not None:
+                assert abs(peak) >= np.abs(values).max() * (1.0 - 1e-6)
+                assert np.interp(peak_time, times, values) == pytest.approx(peak, rel=0.02)
+            if rise is not None and final:
+                assert np.abs(values[times >= settling] / final - 1.0).max() < 0.0201
+                assert rise <= times[np.argmax(values / final >= 0.9)]
