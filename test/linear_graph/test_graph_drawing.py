@@ -126,3 +126,14 @@ def test_dollar_signs_are_plain_text(tmp_path: Path) -> None:
     root = Xml.fromstring(picture.read_text(encoding='utf-8'))
     text = {''.join(element.itertext()).strip() for element in root.iter()}
     assert {r'cost $\foo$ \$1 demo', r'$\foo$'} <= text
+
+
+def test_a_narrow_graph_stands_in_the_middle() -> None:
+    from matplotlib.figure import Figure
+
+    graph = LinearGraph((Branch('R', Kind.D_TYPE, Domain.ELECTRICAL, 'a', 'ground', 'R'),
+                         Branch('C', Kind.A_TYPE, Domain.ELECTRICAL, 'a', 'ground', 'C')))
+    axes = Figure().add_subplot()
+    draw_graph(axes, graph)
+    block, = layout(graph)
+    assert sum(axes.get_xlim()) == pytest.approx(2.0 * block.x + block.width)
