@@ -64,6 +64,12 @@ def test_the_catalogue_is_listed_without_making_a_mistake() -> None:
     one = json.loads(run('effects', 'coulomb_drivetrain', '--json').output)
     assert {row['parameter'] for row in one} == {'dry_torque', 'dry_speed', 'breakaway_share',
                                                  'breakaway_speed'}
+    assert {row['estimated'] for row in one} <= {True, False}
+    every = {row['effect']: row for row in json.loads(run('effects', '--json').output)}
+    assert every['encoder_scale']['sides'] == ['left', 'right']
+    assert every['payload']['sides'] == []
+    assert every['payload']['what_it_is']
+    assert '  left, right  ' in said
 
 
 def test_manoeuvres_and_parameters_are_listed(tmp_path: Path) -> None:
@@ -72,6 +78,9 @@ def test_manoeuvres_and_parameters_are_listed(tmp_path: Path) -> None:
     path = lg.Husky(mass=60.0).save(tmp_path / 'heavy.yaml')
     rows = json.loads(run('parameters', str(path), '--json').output)
     assert next(row['value'] for row in rows if row['parameter'] == 'mass') == 60.0
+    free = {row['parameter']: row['free'] for row in rows}
+    assert free['wheel_damping'] is True
+    assert free['gear_ratio'] is False
 
 
 def test_info_says_what_a_bag_is_good_for(drive: str) -> None:

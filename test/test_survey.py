@@ -51,20 +51,20 @@ def test_wheels_off_the_ground_are_seen_at_once(drive: lg.Recording) -> None:
 def test_a_robot_with_other_wheels_is_no_husky(drive: lg.Recording) -> None:
     slow = scaled(drive.wheels, 0.165 / 0.3)
     warnings = with_streams(drive, wheels=slow).info().warnings
-    assert any('this is not a Husky' in one for one in warnings)
-    assert not any('this is not a Husky' in one for one in
+    assert any('This is not a Husky' in one for one in warnings)
+    assert not any('This is not a Husky' in one for one in
                    with_streams(drive, wheels=scaled(drive.wheels, 1.05)).info().warnings)
 
 
 def test_a_robot_that_is_not_that_of_the_model_is_called_so(drive: lg.Recording) -> None:
     said = drive.info(lg.Husky(wheel_radius=0.1)).warnings
-    assert any(one.startswith('this is not the robot of the model: ') for one in said)
+    assert any(one.startswith('This is not the robot of the model: ') for one in said)
     assert not any('Husky' in one for one in said)
 
 
 def test_a_robot_of_its_own_dimensions_is_no_stranger_to_its_model(drive: lg.Recording) -> None:
     slow = with_streams(drive, wheels=scaled(drive.wheels, 0.165 / 0.3))
-    assert not any('this is not a Husky' in one
+    assert not any('This is not a Husky' in one
                    for one in slow.info(lg.Husky(wheel_radius=0.3)).warnings)
 
 
@@ -110,7 +110,7 @@ def test_what_a_straight_drive_cannot_determine_is_said_before_any_fit() -> None
 
 def test_a_sensor_that_falls_silent_before_the_commands_is_named(drive: lg.Recording) -> None:
     part = with_streams(drive, wheels=drive.wheels.slice(0.0, 8.0))
-    assert any(one.startswith('wheels ends') for one in part.info().warnings)
+    assert any(one.startswith('Stream wheels ends') for one in part.info().warnings)
 
 
 def test_a_drive_faster_than_any_husky_is_named() -> None:
@@ -135,3 +135,12 @@ def test_the_survey_as_data_holds_what_the_text_says(drive: lg.Recording) -> Non
     streams = data['streams']
     assert isinstance(streams, list)
     assert streams[0]['stream'] == 'command'
+
+
+def test_shares_of_regimes_that_overlap_are_called_so(drive: lg.Recording) -> None:
+    assert 'in other regimes too' in drive.info().excitation.title
+
+
+def test_a_perfect_model_leaves_no_error_that_has_a_cause(drive: lg.Recording) -> None:
+    said = str(lg.compare(drive, progress=False).what_to_change)
+    assert 'If errors remain, they have another cause' in said

@@ -41,12 +41,12 @@ def list_effects(name: str | None = None, model: PathLike | Husky | None = None)
     return Table(f'{kind.id}: {kind.title}',
                  ('parameter', 'unit', 'typical', 'lower', 'upper', 'estimated', 'source'),
                  tuple((p.name, p.unit, p.starts[0], p.lower, p.upper,
-                        'no' if p.fixed else 'yes', p.source)
+                        not p.fixed, p.source)
                        for p in (one.of(robot) for one in kind.parameters)))
 
 
-def _words(names: tuple[str, ...]) -> str:
-    return ', '.join(name for name in names if name not in ('', 'none'))
+def _words(names: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for name in names if name not in ('', 'none'))
 
 
 def list_manoeuvres() -> Table:

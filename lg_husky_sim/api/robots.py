@@ -284,7 +284,7 @@ class Husky(Graph):
         return Table('', ('parameter', 'value', 'unit', 'low', 'high', 'lower', 'upper',
                           'tolerance', 'free', 'source'),
                      tuple((p.name, p.value, p.unit, p.low, p.high, p.lower, p.upper,
-                            p.tolerance, 'yes' if p.free else '', p.source)
+                            p.tolerance, p.free, p.source)
                            for p in self.parameters.entries))
 
     def to_pandas(self) -> object:

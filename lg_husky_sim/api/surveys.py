@@ -25,6 +25,7 @@ from lg_husky_sim.identification.multistart import refine
 from lg_husky_sim.identification.problem import observations
 from lg_husky_sim.identification.unknowns import free_names, unknowns_of
 from lg_husky_sim.recording.recording import CONTINUOUS
+from lg_husky_sim.reporting.words import capitalised
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.yaml_files import read_yaml
@@ -179,7 +180,7 @@ def _segments(parts: Sequence[rec.Segment]) -> Table:
 
 def _excitation(recording: Recording) -> tuple[float, Table]:
     """Return the time in motion [s] and how it is shared out among the regimes."""
-    title = 'What was driven'
+    title = 'What was driven (changes of the command are in other regimes too)'
     columns = ('regime', 'time [s]', 'share of motion')
     if 'command' not in recording.streams or len(recording.command) < 2:
         return 0.0, Table(title, columns, ())
@@ -257,7 +258,7 @@ def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relati
         said.append(f'{fastest:.2f} m/s are commanded, but the model has its whole supply at '
                     f'{most:.2f} m/s (1/command_gain): it may be of another robot')
     said += _silences(recording)
-    return tuple(said)
+    return tuple(map(capitalised, said))
 
 
 def _silences(recording: Recording) -> list[str]:
@@ -271,7 +272,7 @@ def _silences(recording: Recording) -> list[str]:
         if series is not None and len(series):
             silent = end - float(series.times[-1])
             if silent > max(1.0, 0.05 * recording.duration):
-                said.append(f'{name} ends {silent:.1f} s before the commands do')
+                said.append(f'stream {name} ends {silent:.1f} s before the commands do')
     return said
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 import math
+import re
 from typing import Any
 
 from lg_husky_sim.extras import require
@@ -19,7 +20,9 @@ def cell(value: object) -> str:
         return '–'
     if isinstance(value, float):
         return f'{value:.4g}'
-    return str(value)
+    if isinstance(value, bool):
+        return 'yes' if value else 'no'
+    return ', '.join(value) if isinstance(value, tuple) else str(value)
 
 
 def is_number(value: object) -> bool:
@@ -37,7 +40,7 @@ class Table:
     title : str
     columns : tuple of str
     rows : tuple of tuple
-        Texts and numbers; None where there is none.
+        Texts, numbers, booleans and tuples of texts; None where there is none.
     """
 
     title: str
@@ -72,8 +75,9 @@ class Table:
         return pd.DataFrame(list(self.rows), columns=list(self.columns))
 
     def data(self) -> list[dict[str, object]]:
-        """Return the rows as plain data for JSON; what is no finite number is None."""
-        return [{name: finite(value) for name, value in zip(self.columns, row, strict=True)}
+        """Return the rows as plain data for JSON, keys in one word; no finite number is None."""
+        keys = [re.sub(r'\W+', '_', name).strip('_') for name in self.columns]
+        return [{key: finite(value) for key, value in zip(keys, row, strict=True)}
                 for row in self.rows]
 
 

@@ -17,8 +17,8 @@ from lg_husky_sim.cli.common import EFFECT, model_option, Output, spoken
 def command(effect: str | None, robot: Path | None, say: Output) -> None:
     """List the effects that a model can have, or the parameters of one.
 
-    Sizes are those of the robot. What diagnose looks for are these, but for static_friction and
-    tyre_windup.
+    Typical values and bounds of parameters are in proportion to the robot. diagnose looks for all
+    of these effects except static_friction and tyre_windup.
     """
     from lg_husky_sim.api.lists import list_effects
     say.result(list_effects(effect, robot))
