@@ -10,6 +10,7 @@ from itertools import zip_longest
 from math import factorial
 
 from lg_husky_sim.linear_graph.state_space import FloatArray
+from lg_husky_sim.linear_graph.transfer import STANDING
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,11 +56,13 @@ class Modes:
         return np.asarray((self.factors * inner * np.exp(self.poles * t)).real.sum(1))
 
     def largest_from(self, time: float) -> FloatArray:
-        """Return the largest size of each mode from a time on, shape (n,); they must not grow."""
-        with np.errstate(divide='ignore', invalid='ignore'):
-            own = np.where(self.powers > 0, -self.powers / self.poles.real, 0.0)
-        t = np.maximum(own, time)
-        return np.asarray(np.abs(self.factors) * t ** self.powers * np.exp(self.poles.real * t))
+        """Return the largest size of each mode from a time on, shape (n,)."""
+        found = np.full(self.poles.shape, np.inf)       # unless it decays
+        at = self.poles.real < 0.0
+        powers, rates = self.powers[at], self.poles.real[at]
+        t = np.maximum(-powers / rates, time)
+        found[at] = np.abs(self.factors[at]) * t ** powers * np.exp(rates * t)
+        return found
 
     def only(self, kept: NDArray[np.bool_]) -> Modes:
         """Return some of the modes."""
@@ -125,6 +128,8 @@ def step_figures(modes: Modes, final: float, end: float) -> StepFigures:
     end : float
         Where to stop if it does not settle [s].
     """
+    if (modes.poles.real > STANDING * np.abs(modes.poles)).any():
+        return StepFigures()        # it grows
     return _Walk(modes, final, end).figures()
 
 
@@ -137,7 +142,7 @@ class _Walk:
         self.settles = not np.isnan(final)
         self.goal = abs(final) if self.settles else 0.0
         self.end = np.inf if self.settles else end
-        self.moving = modes.only(modes.poles != 0.0) if self.settles else modes
+        self.moving = modes.only(modes.poles != 0.0)
         self.crossed: list[float | None] = [None, None]
         self.settling, self.top, self.peak, self.peak_time = 0.0, -np.inf, 0.0, 0.0
 
@@ -175,12 +180,10 @@ class _Walk:
 
     def _chunk(self, begin: float) -> float:
         """Look at the next samples; return the time of the last."""
-        own = self.moving
-        if self.settles:
-            scale = max(self.goal, abs(self.peak))
-            own = own.only(own.largest_from(begin) > np.finfo(float).eps * scale)
+        rounding = np.finfo(float).eps * max(self.goal, abs(self.peak))
+        own = self.moving.only(self.moving.largest_from(begin) > rounding)
         fastest = float(np.abs(own.poles).max(initial=0.0))
-        span = CHUNK / (PER_RADIAN * fastest) if fastest else 1.0
+        span = CHUNK / (PER_RADIAN * fastest) if fastest else 1.0 if self.settles else self.end
         last = min(begin + span, self.end)
         t = np.linspace(begin, last, CHUNK + 1)
         slope = self.modes.slope(t)

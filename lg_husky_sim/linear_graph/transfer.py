@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 SETTLED = 6.0
-"""Time constants of the slowest pole that a response is shown for by default; 0.25 % are left."""
+"""Time constants of the slowest pole that a response is shown for by default, where 0.25 % are
+left; of the fastest that grows, if one does."""
 PERIODS = 5.0
 """Periods shown by default where nothing decays."""
 STEPS, FINEST = 500, 20_000
@@ -146,7 +147,8 @@ def usual_times(poles: NDArray[np.complex128], settling: float = 0.0) -> FloatAr
     moving = poles[np.abs(poles) > STANDING * np.abs(poles).max(initial=0.0)]
     ends = [SETTLED / abs(pole.real) if abs(pole.real) > STANDING * abs(pole)
             else PERIODS * 2.0 * np.pi / abs(pole) for pole in moving]
-    end = max([settling, *ends]) or 1.0
+    growing = poles.real[poles.real > STANDING * np.abs(poles)]
+    end = SETTLED / growing.max() if growing.size else max([settling, *ends]) or 1.0
     step = 10.0 ** np.floor(np.log10(end))      # a round one
     end = np.ceil(end / step) * step
     count = np.clip(PER_FASTEST * end * np.abs(poles).max(initial=0.0), STEPS, FINEST)

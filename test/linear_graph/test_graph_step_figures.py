@@ -10,6 +10,7 @@ from typing import Any
 import lg_husky_sim as lg
 from lg_husky_sim.errors import ParameterError, SettingsError
 from lg_husky_sim.linear_graph import compile_numeric
+from lg_husky_sim.linear_graph.modes import step_figures, step_modes
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -187,3 +188,31 @@ def test_figures_of_examples_agree_with_their_samples(name: str) -> None:
             if rise is not None and final:
                 assert np.abs(values[times >= settling] / final - 1.0).max() < 0.0201
                 assert rise <= times[np.argmax(values / final >= 0.9)]
+
+
+def test_what_grows_is_shown_until_it_has_grown() -> None:
+    """Not for time constants of a slow pole, in which exp(t) overflows."""
+    found = lg.graph("""
+        parameters: {g: 2 S}
+        elements:
+          V: {is: voltage source, from: a}
+          R: {is: resistor, from: a, to: b, value: 1}
+          C: {is: capacitor, from: b, value: 1e-3}
+          I: {is: current source, from: ground, to: b, law: proportional, of: [V(C)],
+              parameters: [g]}
+          R_2: {is: resistor, from: b, to: c, value: 1000}
+          C_2: {is: capacitor, from: c, value: 1}
+        outputs: [V(C)]
+        """).step()
+    assert np.isfinite(found.values).all()
+    assert 1e-3 * 6.0 <= found.times[-1] < 1e-3 * 10.0
+    assert [one is None or np.isnan(one) for one in row(found)] == [True] * 6
+
+
+def test_a_fast_mode_beside_what_swings_on_is_followed_while_it_lasts() -> None:
+    poles = np.array([1j, -1j, 2.5j, -2.5j, -1e5])
+    found = step_figures(step_modes(1.0, np.array([]), poles), float('nan'), 40.0)
+    assert found.complete
+    t = np.linspace(0.0, 40.0, 400_001)
+    own = step_modes(1.0, np.array([]), poles)(t)
+    assert found.peak == pytest.approx(own.max(), rel=1e-7)
