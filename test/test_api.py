@@ -239,7 +239,7 @@ def test_a_comparison_is_written_with_its_page(drive: Path, tmp_path: Path) -> N
 
 
 def test_a_negative_horizon_is_refused(drive: Path) -> None:
-    with pytest.raises(CommandError, match='horizon = -1.0 s must be 0'):
+    with pytest.raises(CommandError, match=r'horizon = -1\.0 s must be 0'):
         lg.compare(drive, horizon=-1.0)
 
 

@@ -183,7 +183,6 @@ def test_a_report_that_cannot_be_made_costs_no_result(
 
 @pytest.mark.parametrize(('arguments', 'message'), [
     (['nowhere'], 'nowhere'),
-    (['{bag}', '--set', 'mass=heavy'], 'heavy'),
     (['{bag}', '--set', 'masss=50'], 'did you mean mass'),
     (['{bag}', '--baseline', 'gone'], 'gone'),
 ])
