@@ -226,10 +226,10 @@ def _value_latex(text: str, replaced: dict[str, str] | None = None) -> str:
     return str(sympy.latex(expression, symbol_names=names, mul_symbol=PRODUCT))
 
 
-_GREEK = {name: f'\\{name}' for name in (
+_LETTERS = (
     'alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau '
-    'upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega'
-).split()}
+    'upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega')
+_GREEK = {name: f'\\{name}' for name in _LETTERS.split()}
 _VARIABLE = re.compile(r'(\w+)\((\w+?)(?:\.([12]))?\)')
 
 
