@@ -120,20 +120,25 @@ def bounds_of(nominal: Parameter, value: float, robot: RobotSize = HUSKY,
         lower = given.lower
     elif value < lower:
         if lower > reach * value:
-            raise ParameterError(_far(words, 'below its lower', lower))
+            raise ParameterError(_far(words, 'below its lower', lower, nominal, robot))
         lower = value / reach
     if given is not None and given.upper is not None:
         upper = given.upper
     elif value > upper:
         if value > reach * upper:
-            raise ParameterError(_far(words, 'above its upper', upper))
+            raise ParameterError(_far(words, 'above its upper', upper, nominal, robot))
         upper = value * reach
     return lower, upper
 
 
-def _far(words: str, side: str, bound: float) -> str:
-    return (f'{words} is {side} bound {bound:.3g} by more than a factor of {setting("reach"):g}; '
-            'if it is right, give it a bound of its own')
+def _far(words: str, side: str, bound: float, nominal: Parameter, robot: RobotSize) -> str:
+    # A slip in a size of the robot shows in what is in proportion to it.
+    sizes = {} if nominal.name in SIZES else robot.sizes(nominal.unit)
+    beside = ' and '.join(f"{size:.3g} times the Husky's {name}" for name, size in sizes.items())
+    why = f' (in proportion to {beside})' if robot != HUSKY and beside else ''
+    return (f'{words} is {side} bound {bound:.3g}{why} by more than a factor of '
+            f'{setting("reach"):g}; if {"all of this" if why else "it"} is right, give it a bound '
+            'of its own')
 
 
 @cache

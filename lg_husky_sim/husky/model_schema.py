@@ -36,7 +36,7 @@ PARAMETER: dict[str, Any] = {
                   'Lower bound, in the unit; by default in proportion to the robot.'},
         'upper': {**_NUMBER, 'description':
                   'Upper bound, in the unit; by default in proportion to the robot.'},
-        'tolerance': {**_NUMBER, 'description':
+        'tolerance': {**_NUMBER, 'minimum': 0, 'description':
                       'Relative uncertainty of a nominal value; 0 for an exact one.'},
         'free': {**_FLAG, 'description': 'Whether identify varies it unless told otherwise.'},
         'source': {**_TEXT, 'description': 'Where the value comes from.'},

@@ -58,7 +58,7 @@ class Parameter:
     Raises
     ------
     ParameterError
-        If the value is not finite or outside its bounds.
+        If the value is not finite or outside its bounds, or the tolerance is negative.
     """
 
     name: str
@@ -77,6 +77,8 @@ class Parameter:
         if not self.lower <= self.upper:
             raise ParameterError(
                 f'{self.name}: lower bound {self.lower:g} is above upper bound {self.upper:g}')
+        if not self.tolerance >= 0.0:
+            raise ParameterError(f'{self.name}: tolerance = {self.tolerance:g} is negative')
         if not math.isfinite(self.value):
             raise ParameterError(f'{self.name} = {self.value} {self.unit} is not a finite number')
         if not self.lower <= self.value <= self.upper:

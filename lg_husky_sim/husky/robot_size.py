@@ -43,10 +43,14 @@ class RobotSize:
 
     def factor(self, unit: str) -> float:
         """Return how many times as large a number of this unit is as the Husky's."""
-        kg, m, s, volt = _exponents(unit)
-        if not kg and not volt:
-            return 1.0 if s else float(self.length ** m)
-        return float(self.mass ** kg * self.length ** (m + 0.5 * s) * self.voltage ** volt)
+        mass, length, voltage = _powers(unit)
+        return float(self.mass ** mass * self.length ** length * self.voltage ** voltage)
+
+    def sizes(self, unit: str) -> dict[str, float]:
+        """Return by name, in parts of the Husky's, the sizes that a unit's numbers follow."""
+        told = {'mass': self.mass, 'length': self.length, 'supply voltage': self.voltage}
+        return {name: size for (name, size), power in zip(
+            told.items(), _powers(unit), strict=True) if power}
 
 
 #: The robot itself.
@@ -63,6 +67,12 @@ def _exponents(unit: str) -> tuple[int, int, int, int]:
             for k, exponent in enumerate(_UNITS.get(name, (0, 0, 0, 0))):
                 total[k] += (1 if place == 0 else -1) * _POWERS[power] * exponent
     return total[0], total[1], total[2], total[3]
+
+
+def _powers(unit: str) -> tuple[float, float, float]:
+    # Of mass, length and voltage; times of electronics and of use follow from none of them.
+    kg, m, s, volt = _exponents(unit)
+    return (kg, m + 0.5 * s, volt) if kg or volt else (0, 0 if s else m, 0)
 
 
 def size_of(robot: Mapping[str, float], husky: Mapping[str, float]) -> RobotSize:

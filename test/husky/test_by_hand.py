@@ -53,6 +53,9 @@ def test_robots_of_6_and_280_kg_can_be_described(
     ({'wheel_radius': 98.0}, 'wheel_radius = 98 m is above its upper bound 2 by more than a '
      'factor of 10; if it is right, give it a bound of its own'),
     ({'mass': 0.01}, 'mass = 0.01 kg is below its lower bound 1 by more than a factor of 10'),
+    ({**SMALL, 'mass': 6000.0}, 'wheel_damping = 0.02 N·m·s/rad is below its lower bound 0.264 '
+     "(in proportion to 124 times the Husky's mass and 0.357 times the Husky's length) by more "
+     'than a factor of 10; if all of this is right, give it a bound of its own'),
     ({'mass': 'heavy'}, "mass = 'heavy' is not a number"),
     ({'mass': True}, 'mass = True is not a number'),
     ({'mass': float('nan')}, 'mass = nan kg is not a finite number'),

@@ -221,6 +221,12 @@ def test_numbers_alone_are_a_robot(tmp_path: Path) -> None:
     assert (damping.lower, damping.upper, damping.free) == (0.1, 1000.0, True)
 
 
+def test_a_negative_tolerance_is_refused(tmp_path: Path) -> None:
+    values = {entry.name: entry.value for entry in load_model().parameters.entries}
+    with pytest.raises(ModelFileError, match=r'mass: tolerance = -0\.02 is negative'):
+        load_model(written(tmp_path, {**values, 'mass': {'value': 42.0, 'tolerance': -0.02}}))
+
+
 def test_effects_of_a_large_robot_are_in_proportion(tmp_path: Path) -> None:
     values = {entry.name: entry.value for entry in load_model().parameters.entries}
     values['mass'] *= 10.0
