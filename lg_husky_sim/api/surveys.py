@@ -248,7 +248,7 @@ def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relati
     robot = 'the robot of the model' if other_robot(
         packaged().parameters, husky.parameters) else 'a Husky'
     for one in differences(related, husky.parameters):
-        said.append(one.statement if not one.on_ground else (
+        said.append(one.statement if not one.comparable else (
             f'this is not {robot}: {one.statement} (or wheel rates are scaled); give its '
             'dimensions in a model file of its own'))
     fastest = max((float(np.abs(series.column('forward')).max()) for name, series in

@@ -40,7 +40,7 @@ from lg_husky_sim.diagnosis.sensors.repair import (
     fault_findings,
     UNMODELLED,
 )
-from lg_husky_sim.diagnosis.sensors.robot import differences, impossible
+from lg_husky_sim.diagnosis.sensors.robot import differences, impossible, misread
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
@@ -108,7 +108,8 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     parts = tuple(s for r in recordings for s in segments(r))
     progress('comparing the sensors', 0.01)
     related = relations(parts)
-    seen, different = faults(related), differences(related, nominal.parameters)
+    seen = faults(related)
+    different = misread(seen) or differences(related, nominal.parameters)
     numbers = nominal.parameters.replacing({k: v for d in different for k, v in d.numbers.items()})
     with threads(jobs) as pool:
         start = beginning(nominal.structure, base_unknowns(numbers, drives), numbers, Reading())

@@ -80,7 +80,7 @@ def model_mismatch(found: Sequence[Difference], search: Search, plain_out: Mappi
     """
     first = max(found, key=lambda one: one.certainty)
     base, out, everywhere = None, {}, {}
-    if all(one.on_ground for one in found):
+    if all(one.comparable for one in found):
         train, test = split(parts)
         late = {}
         for fault in faults:

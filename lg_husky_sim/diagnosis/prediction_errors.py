@@ -30,7 +30,7 @@ from lg_husky_sim.diagnosis.sensors.relations import relations
 from lg_husky_sim.diagnosis.sensors.robot import differences
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import ModelFileError
-from lg_husky_sim.husky.effects import effect_kind
+from lg_husky_sim.husky.effects import effect_kind, Subsystem
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.data import Advice
@@ -182,10 +182,11 @@ def assess(parts: Predicted, label: str, parameters: Parameters) -> Assessment:
     others = differences(related, parameters)
     for other in others:
         radius = other.numbers.get('wheel_radius', math.nan)
-        found.append(_error('other_robot' if other.on_ground else 'off_ground',
-                            Number(radius, math.nan, math.nan), words=other.statement,
+        kind = 'other_robot' if other.comparable else (
+            'sensor' if other.subsystem == Subsystem.SENSOR.value else 'off_ground')
+        found.append(_error(kind, Number(radius, math.nan, math.nan), words=other.statement,
                             wheel_radius=radius))
-    if any(not other.on_ground for other in others):
+    if any(not other.comparable for other in others):
         return Assessment(label, tuple(found), compared=True)
     fits = {name: fit for name, fit in body_fits(parts).items()
             if _STREAM_OF[name] not in accused}

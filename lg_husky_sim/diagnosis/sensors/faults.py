@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 from lg_husky_sim.diagnosis.result import Estimate
 from lg_husky_sim.diagnosis.sensors.regression import Number
@@ -19,6 +21,7 @@ from lg_husky_sim.yaml_files import read_yaml
 
 #: What the streams are called.
 WORDS: Mapping[str, str] = {'imu': 'the IMU', 'wheels': 'the wheels (joint states)',
+                            'command': 'the commands',
                             'pose': 'the pose (tf or odometry)'}
 _RATE = 'yaw rate'
 Known = Mapping[tuple[str, str, str], Relation]
@@ -34,7 +37,8 @@ class Fault:
     effect : Effect or None
         Of the catalogue; None where it has none.
     stream : str
-        imu, wheels or pose; empty where two contradict each other and no third one decides.
+        imu, wheels, pose or command; empty where two contradict each other and no third one
+        decides.
     number : Estimate or None
     certainty : float
         How many standard deviations it is beyond its tolerance.
@@ -50,12 +54,37 @@ class Fault:
 
 def effect_of(fault: str, stream: str = '') -> Effect:
     """Return the effect of the catalogue that a fault is, by ``config/sensor_faults.yaml``."""
+    return Effect(str(_table()['faults'][fault]), shape=stream)
+
+
+@cache
+def _table() -> Mapping[str, Any]:
     path = config_path('sensor_faults.yaml')
     data = read_yaml(path, ModelFileError)
     if data.get('schema') != 'lg_husky_sim/sensor_faults/1':
         raise ModelFileError(f'{path}: not a table of faults of sensors '
                              '(schema lg_husky_sim/sensor_faults/1)')
-    return Effect(str(data['faults'][fault]), shape=stream)
+    return data
+
+
+def unit_of(ratio: float) -> str | None:
+    """
+    Return the unit in which a rate seems to be that reads as if it were in rad/s.
+
+    Parameters
+    ----------
+    ratio : float
+        What should be read over what is.
+
+    Returns
+    -------
+    str or None
+        None where it is near none.
+    """
+    for name, size in _table()['units'].items():
+        if abs(abs(ratio) / float(size) - 1.0) < setting('other_radius'):
+            return str(name)
+    return None
 
 
 def faults(found: Sequence[Relation]) -> tuple[Fault, ...]:
@@ -71,10 +100,12 @@ def faults(found: Sequence[Relation]) -> tuple[Fault, ...]:
     tuple of Fault
         Most serious first: a wrong sign, then late stamps, factors and offsets.
     """
-    known = {key: one for key, one in by_names(found).items()
+    every = by_names(found)
+    known = {key: one for key, one in every.items()
              if one.explained > setting('least_explained')}
-    wrong = _signs(known)
-    return (*wrong, *_late(known), *(() if wrong else (*_gain(known), *_bias(known))))
+    wrong = [*_signs(known), *_dead(every)]
+    return (*wrong, *_late(known), *(() if wrong else (
+        *_gain(known), *_bias(known), *_commanded(known))))
 
 
 def _number(effect: Effect, value: Number) -> Estimate:
@@ -95,11 +126,26 @@ def _signs(known: Known) -> list[Fault]:
     def reversed_(one: Relation | None) -> bool:
         return one is not None and one.factor.is_off(0.0, 0.0) and one.factor.value < 0.0
     made: list[Fault] = []
+    sides = {side: known.get(('speed', f'{side} wheels', 'pose')) for side in ('left', 'right')}
+    for side, one in sides.items():
+        other = sides['right' if side == 'left' else 'left']
+        if one is not None and reversed_(one) and other is not None and (
+                other.factor.is_off(0.0, 0.0) and not reversed_(other)):
+            made.append(Fault(None, 'wheels', None, _beyond(one.factor, 0.0, 0.0),
+                              f'The {side} wheels turn backwards while the pose moves forward, '
+                              'and the others do not: the sign of their rates is wrong (a motor '
+                              'that is mounted the other way round)'))
     if speed is not None and reversed_(speed):
-        made.append(Fault(None, 'wheels', None, _beyond(speed.factor, 0.0, 0.0),
-                          'The wheels turn backwards while the pose moves forward: both wheel '
-                          'rates '
-                          'have the wrong sign, or the x axis of the pose points backwards'))
+        # Both signs would turn the yaw rate about as well.
+        turns = both or turn
+        made.append(Fault(None, 'pose' if turns and not reversed_(turns) else 'wheels', None,
+                          _beyond(speed.factor, 0.0, 0.0),
+                          'The wheels turn backwards while the pose moves forward: ' + (
+                              'both wheel rates have the wrong sign, or the x axis of the pose '
+                              'points backwards' if not turns else
+                              'both wheel rates have the wrong sign' if reversed_(turns) else
+                              'the x axis of the pose points backwards, or its axes are '
+                              'interchanged')))
     count = [reversed_(one) for one in (gyro, both, turn)]
     if gyro is not None and count[0] and (both is None or count[1] or not count[2]):
         made.append(_reversed_gyro(gyro, 1.0, 'the pose'))
@@ -114,6 +160,38 @@ def _signs(known: Known) -> list[Fault]:
                           'The robot turns to the left when its left wheels turn faster: the '
                           'wheels of the two sides are interchanged'))
     return made
+
+
+def _dead(every: Known) -> list[Fault]:
+    # What does not follow anything, while the others follow each other.
+    turn, both = every.get((_RATE, 'wheels', 'pose')), every.get((_RATE, 'wheels', 'imu'))
+    least = setting('least_explained')
+    if turn is None or both is None or turn.explained < least or both.explained > least:
+        return []
+    if max(abs(both.factor.low), abs(both.factor.high)) > setting('no_ground') * abs(
+            turn.factor.value):
+        return []
+    return [Fault(None, 'imu', None, _beyond(turn.factor, 0.0, 0.0),
+                  'The gyro does not turn while the wheels and the heading of the pose do: it is '
+                  'dead, or the yaw axis of the robot is another one of the IMU')]
+
+
+def _commanded(known: Known) -> list[Fault]:
+    # Commands of yaw against how the robot turns.
+    one = known.get((_RATE, 'command', 'pose')) or known.get((_RATE, 'command', 'imu'))
+    if one is None or not one.factor.is_off(0.0, 0.0):
+        return []
+    sure = _beyond(one.factor, 0.0, 0.0)
+    if one.factor.value < 0.0:
+        return [Fault(None, 'command', None, sure,
+                      'The robot turns against its commands: the sign of the commanded yaw rate '
+                      'is wrong')]
+    unit = unit_of(one.factor.value)
+    if unit is None or one.factor.value > setting('no_ground'):
+        return []
+    return [Fault(None, 'command', None, sure,
+                  f'The robot turns {one.factor.value:.3f} of what it is told to: commanded yaw '
+                  f'rates seem to be in {unit}, and a Twist has them in rad/s')]
 
 
 def _reversed_gyro(one: Relation, scale: float, reference: str) -> Fault:
@@ -135,11 +213,14 @@ def _gain(known: Known) -> list[Fault]:
     if one is None or not one.factor.is_off(1.0, tolerance):
         return []
     factor = Number(1.0 / one.factor.value, 1.0 / one.factor.high, 1.0 / one.factor.low)
-    effect = effect_of('gain')
-    return [Fault(effect, 'imu', _number(effect, factor),
-                  _beyond(one.factor, 1.0, tolerance),
-                  f'The gyro reads {factor.value:.3f} ({factor.low:.3f} to {factor.high:.3f}) of '
-                  'the rate at which the heading of the pose changes')]
+    effect, unit = effect_of('gain'), unit_of(one.factor.value)
+    sure = _beyond(one.factor, 1.0, tolerance)
+    said = (f'The gyro reads {factor.value:.3f} ({factor.low:.3f} to {factor.high:.3f}) of '
+            'the rate at which the heading of the pose changes')
+    if unit is not None:
+        return [Fault(None, 'imu', None, sure,
+                      f'{said}: it seems to be in {unit}, and an Imu has it in rad/s')]
+    return [Fault(effect, 'imu', _number(effect, factor), sure, said)]
 
 
 def _bias(known: Known) -> list[Fault]:
@@ -181,8 +262,12 @@ def _late(known: Known) -> list[Fault]:
                 second = _turned_about(by_wheels.late, True)
                 late = Number(late.value, min(late.low, second.low), max(late.high, second.high))
             return [_stamps(bad[0], late, (other, 'wheels'))]
-        return [_pair('imu', 'pose', gyro)]
-    return [_pair('wheels', name, one) for name, one in wheels.items()
+        return [_pair('imu', 'pose', gyro, (
+            'both turn with the robot. The wheels do not tell which of them is at fault: a body '
+            'may follow them by as much' if len([w for w in wheels.values() if w]) == len(wheels)
+            else 'both turn with the robot; a third stream would tell which of them is at fault'))]
+    return [_pair('wheels', name, one, 'further than a robot lags its wheels; a third stream '
+                  'would tell which of them is at fault') for name, one in wheels.items()
             if one is not None and _unphysical(one)]
 
 
@@ -218,7 +303,7 @@ def _stamps(stream: str, late: Number, others: tuple[str, ...]) -> Fault:
         f'{how} than those of {" and ".join(WORDS[other] for other in others)}')
 
 
-def _pair(first: str, second: str, one: Relation) -> Fault:
+def _pair(first: str, second: str, one: Relation, why: str) -> Fault:
     late = one.late
     if late.value < 0.0:
         first, second, late = second, first, _turned_about(late, True)
@@ -226,5 +311,4 @@ def _pair(first: str, second: str, one: Relation) -> Fault:
                  _beyond(late, 0.0, setting('late_tolerance')),
                  f'The stamps of {WORDS[first]} are {number(late.value)} s '
                  f'({number(late.low)} to {number(late.high)}) later than those of '
-                 f'{WORDS[second]}, further than a robot '
-                 'lags its wheels; a third stream would tell which of them is at fault')
+                 f'{WORDS[second]}: {why}')

@@ -8,7 +8,8 @@ Two streams that see the same motion are related over any window [a, b] by::
     change of the reference = factor * (change of the source, late by d) + offset * (b - a)
 
 A gyro and the heading of a pose see the same yaw rate, with a factor of one. Wheels see the speed
-with their rolling radius as the factor, and the yaw rate with that over the effective track.
+with their rolling radius as the factor, and the yaw rate with that over the effective track; where
+their mean does not see the speed, each side is related to it by itself, with half of that radius.
 """
 
 from __future__ import annotations
@@ -20,9 +21,12 @@ from types import MappingProxyType
 from lg_husky_sim.diagnosis.sensors.regression import Number, regression, Way
 from lg_husky_sim.diagnosis.sensors.ways import (
     advance,
+    commanded_turn,
     gyro,
     heading,
     mean_wheel,
+    turned_left,
+    turned_right,
     wheel_difference,
 )
 from lg_husky_sim.diagnosis.settings import setting
@@ -39,9 +43,10 @@ class Relation:
     quantity : str
         ``yaw rate`` or ``speed``.
     source, reference : str
-        Streams: imu, wheels or pose.
+        Streams: imu, wheels, pose or command; left wheels and right wheels.
     factor : Number
-        Reference over source [1, or m for wheels against a speed or their difference].
+        Reference over source [1, or m for wheels against a speed, their difference against a
+        yaw rate].
     late : Number
         How much later the source's stamps are than the reference's [s].
     offset : Number
@@ -71,6 +76,8 @@ _PAIRS = (
     ('yaw rate', 'wheels', 'imu', wheel_difference, gyro),
     ('yaw rate', 'wheels', 'pose', wheel_difference, heading),
     ('speed', 'wheels', 'pose', mean_wheel, advance),
+    ('yaw rate', 'command', 'imu', commanded_turn, gyro),
+    ('yaw rate', 'command', 'pose', commanded_turn, heading),
 )
 
 
@@ -92,7 +99,22 @@ def relations(parts: Sequence[Segment]) -> tuple[Relation, ...]:
         one = _relation(parts, quantity, (source, reference), own, other)
         if one is not None:
             found.append(one)
+            if quantity == 'speed' and one.explained < setting('least_explained'):
+                found += _sides(parts)
     return tuple(found)
+
+
+def _sides(parts: Sequence[Segment]) -> list[Relation]:
+    # Each side by itself, in one regression.
+    pairs = [(reference, (left, right)) for part in parts
+             if (reference := advance(part)) is not None
+             and (left := turned_left(part)) is not None
+             and (right := turned_right(part)) is not None]
+    found = regression(pairs, 2 * (setting('least_wheel_motion'),), offset=False)
+    return [] if found is None else [
+        Relation('speed', source, 'pose', factor, found.late, found.offset, found.explained,
+                 found.interval, found.seconds)
+        for source, factor in zip(('left wheels', 'right wheels'), found.factors, strict=True)]
 
 
 def _relation(parts: Sequence[Segment], quantity: str, names: tuple[str, str],

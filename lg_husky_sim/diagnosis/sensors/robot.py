@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from lg_husky_sim.diagnosis.evidence.evidence import Fit
+from lg_husky_sim.diagnosis.sensors.faults import Fault, unit_of
 from lg_husky_sim.diagnosis.sensors.relations import by_names, Relation
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.parameters import Parameters
@@ -29,8 +30,9 @@ class Difference:
         How many standard deviations it is beyond its tolerance.
     numbers : mapping of str to float
         Parameters that the robot has instead.
-    on_ground : bool
-        Whether the robot moves as its wheels turn.
+    comparable : bool
+        Whether another base may be fitted to it: its wheels move it, and its streams are of one
+        robot.
     """
 
     subsystem: str
@@ -39,7 +41,7 @@ class Difference:
     statement: str
     certainty: float
     numbers: Mapping[str, float] = field(default_factory=dict)
-    on_ground: bool = True
+    comparable: bool = True
 
 
 def differences(found: Sequence[Relation], parameters: Parameters) -> tuple[Difference, ...]:
@@ -62,22 +64,46 @@ def differences(found: Sequence[Relation], parameters: Parameters) -> tuple[Diff
         return ()
     radius, rolls = parameters['wheel_radius'], speed.factor
     off = (abs(rolls.value) - radius) / max(rolls.deviation, 1e-12)
-    if max(abs(rolls.low), abs(rolls.high)) < setting('no_ground') * radius:
+    sides = [one.factor for key, one in known.items() if key[1] in ('left wheels', 'right wheels')]
+    if speed.explained < setting('least_explained') and sum(
+            max(abs(one.low), abs(one.high)) for one in (sides or [rolls])) < (
+                setting('no_ground') * radius):
         return (Difference(
             'traction', ('B_FL', 'B_RL', 'B_FR', 'B_RR'), 'wherever the wheels turn',
             'There is no ground reaction: the wheels turn as commanded and the robot stays where '
             f'it is ({rolls.value:.3f} m per radian where a wheel of {radius:g} m rolls that '
             'far). The wheels are off the ground, or the pose is not that of this robot', abs(off),
-            on_ground=False),)
+            comparable=False),)
+    if rolls.value <= 0.0:
+        return ()  # the wrong sign is a fault of a sensor
+    unit = unit_of(rolls.value / radius)
+    if unit is not None and speed.explained > setting('proportional'):
+        return (Difference(
+            'sensor', ('joint_states',), 'wherever the wheels turn',
+            f'The wheels roll {rolls.value:.2g} m per radian where those of the model roll '
+            f'{radius:.3g} m: their rates are in {unit} (a JointState has them in rad/s), or the '
+            'wheel radius of the model is wrong',
+            abs(off), comparable=False),)
     # One that moves less may slip, which the model can do: a fit has to say what that would take.
-    if speed.explained < setting('least_explained') or rolls.value < radius or not rolls.is_off(
-            radius, setting('other_radius') * radius):
+    # But what slips by a resistance does not do so in proportion.
+    smaller = rolls.value < (1.0 - setting('largest_slip')) * radius and (
+        speed.explained > setting('proportional'))
+    larger = rolls.value >= radius and rolls.is_off(radius, setting('other_radius') * radius)
+    if speed.explained < setting('least_explained') or not (smaller or larger):
         return ()
     return (Difference(
         'traction', (), 'wherever the wheels turn',
         f'its wheels roll {rolls.value:.3f} m ({rolls.low:.3f} to {rolls.high:.3f}) per radian '
         f'where those of the model roll {radius:.3f} m', abs(off),
         {'wheel_radius': rolls.value}),)
+
+
+def misread(found: Sequence[Fault]) -> tuple[Difference, ...]:
+    """Return the faults of sensors with which no model can be compared, as differences."""
+    elements = {'wheels': 'joint_states', 'pose': 'tf'}
+    return tuple(Difference(
+        'sensor', (elements.get(one.stream, one.stream),), 'everywhere', one.statement,
+        one.certainty, comparable=False) for one in found if one.effect is None and one.stream)
 
 
 def impossible(fit: Fit, parameters: Parameters) -> tuple[Difference, ...]:

@@ -52,6 +52,28 @@ def wheel_angles(part: Segment) -> tuple[FloatArray, FloatArray] | None:
         integral(rates.times, rates.column(side))[1] for side in ('left', 'right')]))
 
 
+def turned_left(part: Segment) -> Way | None:
+    """Return the angle of the left wheels [rad]."""
+    wheels = wheel_angles(part)
+    return None if wheels is None else (wheels[0], wheels[1][:, 0])
+
+
+def turned_right(part: Segment) -> Way | None:
+    """Return the angle of the right wheels [rad]."""
+    wheels = wheel_angles(part)
+    return None if wheels is None else (wheels[0], wheels[1][:, 1])
+
+
+def commanded_turn(part: Segment) -> Way | None:
+    """Return the angle by which the base was told to turn [rad]."""
+    command = part.streams.get('command')
+    if command is None or len(command) < 2:
+        return None
+    # A command holds until the next one.
+    steps = command.column('yaw')[:-1] * np.diff(command.times)
+    return command.times, np.concatenate([[0.0], np.cumsum(steps)])
+
+
 def wheel_difference(part: Segment) -> Way | None:
     """Return by how much the right wheels have turned further than the left ones [rad]."""
     wheels = wheel_angles(part)
