@@ -207,7 +207,8 @@ def test_a_diagnosis_without_end_is_refused(tmp_path: Path) -> None:
         run('plan-drive', str(tmp_path), '--out', str(tmp_path / 'drive.yaml'))
 
 
-@pytest.mark.parametrize('verb', ['info', 'simulate', 'identify', 'evaluate', 'diagnose'])
+@pytest.mark.parametrize('verb', ['info', 'simulate', 'identify', 'evaluate', 'diagnose',
+                                  'compare', 'twin', 'demo'])
 def test_a_robot_is_given_to_every_verb_by_the_same_word(verb: str) -> None:
     command = main.cli.get_command(click.Context(main.cli), verb)
     assert command is not None

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @click.command(cls=SeveralWords,
                short_help='Replay recordings through models; figures and errors.')
 @click.argument('recordings', nargs=-1, required=True, metavar='REC [REC …]', type=RECORDING)
-@click.option('--model', 'models', multiple=True, type=MODEL, metavar='FILE.yaml',
+@click.option('--model', '--robot', 'models', multiple=True, type=MODEL, metavar='FILE.yaml',
               help="Model file; several are shown side by side. The Husky with the paper's "
                    'parameters by default, which is also called paper.')
 @click.option('--out', required=True, type=click.Path(path_type=Path), metavar='DIR',

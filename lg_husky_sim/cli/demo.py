@@ -19,7 +19,7 @@ MARKER = 'summary.txt'
               help='Folder for bag/, picture.png and summary.txt; an earlier run is replaced.')
 @click.option('--manoeuvre', default='circle', show_default=True, metavar='NAME',
               help='One of the built-in manoeuvres.')
-@click.option('--model', default='', metavar='FILE.yaml',
+@click.option('--model', '--robot', 'model', default='', metavar='FILE.yaml',
               help='Model file for the node, as written by identify and diagnose.')
 def command(out: Path, manoeuvre: str, model: str) -> None:
     """

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 @click.command(cls=RosVerb, epilog=ROS_HELP,
                short_help='Run models alongside a live robot; show their errors.')
-@click.option('--model', required=True, type=click.Path(path_type=Path), metavar='FILE.yaml',
+@click.option('--model', '--robot', 'model', required=True, type=click.Path(path_type=Path),
+              metavar='FILE.yaml',
               help='Model file, such as the model.yaml of a diagnosis.')
 @click.option('--plain', type=click.Path(path_type=Path), metavar='FILE.yaml',
               help="Model to compare with; by default the Husky with the paper's parameters, or "
