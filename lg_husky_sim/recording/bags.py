@@ -22,7 +22,9 @@ from lg_husky_sim.yaml_files import shown
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
-SUFFIXES = ('.mcap', '.db3', '.bag')
+REPAIRS = {'.mcap': 'mcap recover', '.db3': 'sqlite3 FILE.db3 .recover', '.bag': 'rosbag reindex'}
+"""Kinds of files that can be read, and the tools that repair them."""
+SUFFIXES = tuple(REPAIRS)
 LONGEST_REASON = 200
 #: Largest stamp of 64 bits [ns].
 LATEST = 2**63 - 1
@@ -181,7 +183,7 @@ def _repaired(files: list[Path], scratch: Path) -> tuple[list[Path], list[str]]:
     if not cut:
         return files, []
     whole = [salvage(part, scratch) if part in cut else part for part in parts]
-    return whole, [f'{part.name} is truncated: read up to its last complete chunk' for part in cut]
+    return whole, [f'{part.name} is truncated: read as far as it is complete' for part in cut]
 
 
 def _reason(error: Exception) -> str:
@@ -194,8 +196,10 @@ def _reason(error: Exception) -> str:
 
 
 def _advice(files: list[Path]) -> str:
-    """Return how to repair a bag of this kind."""
-    if files[0].suffix == '.bag':
-        return ' (a damaged bag can often be repaired with `rosbag reindex`)'
-    return (' (a truncated recording can often be repaired with `ros2 bag reindex` or '
-            '`mcap recover`)')
+    """Return how to repair a bag of this kind, as far as there is something to repair."""
+    data = sorted(files[0].iterdir()) if files[0].is_dir() else files
+    data = [part for part in data if part.suffix in REPAIRS]
+    empty = [part.name for part in data if not part.stat().st_size]
+    if empty:
+        return f' ({", ".join(empty)} is empty)'
+    return f' (`{REPAIRS[data[0].suffix]}` may repair it)' if data else ''

@@ -88,7 +88,7 @@ def read_recording(path: str | PathLike[str], topics: TopicMap | None = None) ->
         read = _recording(place, present, found, chosen, whose)
         return replace(read, notes=(*repaired, *read.notes))
     except RecordingError as error:
-        raise RecordingError(f'cannot use {place}: {error}') from error
+        raise RecordingError('; '.join([f'cannot use {place}: {error}', *repaired])) from error
 
 
 def _collect(

@@ -326,7 +326,7 @@ def test_best_effort_publishers_are_recorded_and_kill_9_loses_a_second_at_most(
     if storage == 'mcap':
         # rosbag2 counts its files.
         assert read.notes[0].removeprefix('bag').removeprefix('_0') == (
-            '.mcap is truncated: read up to its last complete chunk')
+            '.mcap is truncated: read as far as it is complete')
 
 
 def test_the_time_of_a_recording_begins_with_the_first_message(
