@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 import tempfile
@@ -15,6 +15,7 @@ from lg_husky_sim import recording as rec
 from lg_husky_sim.api.progress import Shown, shown
 from lg_husky_sim.api.recordings import check_count, given, PathLike, read_all, Recordings, Topics
 from lg_husky_sim.api.robots import Husky
+from lg_husky_sim.api.sensor_warnings import warnings_of
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.errors import FitError
@@ -193,6 +194,8 @@ def identify(husky: Husky, recordings: Recordings, free: Iterable[str] = (), *,
                           nuisance=nuisance, profiles=profiles, seed=seed,
                           starts=starts, jobs=jobs, scheduler=scheduler, baseline=husky.model,
                           progress=lambda word: report(f'fitting: {word}', None))
+    said = warnings_of(parts, result.model, nuisance)
+    result = replace(result, warnings=(*said, *result.warnings))
     return Fit(result, parts, husky, tuple((one.name, one.path) for one in read))
 
 

@@ -12,20 +12,16 @@ from typing import TYPE_CHECKING
 from lg_husky_sim import recording as rec
 from lg_husky_sim.api.recordings import PathLike, rate, Recording
 from lg_husky_sim.api.robots import as_husky, Husky
+from lg_husky_sim.api.sensor_warnings import sensor_warnings
 from lg_husky_sim.api.tables import page_part, Table
-from lg_husky_sim.diagnosis.sensors.faults import faults
 from lg_husky_sim.diagnosis.sensors.regression import Number
 from lg_husky_sim.diagnosis.sensors.relations import Relation, relations
-from lg_husky_sim.diagnosis.sensors.robot import differences
 from lg_husky_sim.errors import FitError, ParameterError, RecordingError
-from lg_husky_sim.husky.by_hand import other_robot
-from lg_husky_sim.husky.model_file import packaged
 from lg_husky_sim.identification.confidence import confidence, undetermined
 from lg_husky_sim.identification.multistart import refine
 from lg_husky_sim.identification.problem import observations
 from lg_husky_sim.identification.unknowns import free_names, unknowns_of
 from lg_husky_sim.recording.recording import CONTINUOUS
-from lg_husky_sim.reporting.words import capitalised
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.yaml_files import read_yaml
@@ -244,13 +240,7 @@ def _number(one: Number, digits: int) -> str:
 
 def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relation]
                     ) -> tuple[str, ...]:
-    said = [one.statement for one in faults(related)]
-    robot = 'the robot of the model' if other_robot(
-        packaged().parameters, husky.parameters) else 'a Husky'
-    for one in differences(related, husky.parameters):
-        said.append(one.statement if not one.comparable else (
-            f'this is not {robot}: {one.statement} (or wheel rates are scaled); give its '
-            'dimensions in a model file of its own'))
+    said = list(sensor_warnings(related, husky.model))
     fastest = max((float(np.abs(series.column('forward')).max()) for name, series in
                    recording.streams.items() if name == 'command' and len(series)), default=0.0)
     most = 1.0 / husky.parameters['command_gain']
@@ -258,7 +248,7 @@ def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relati
         said.append(f'{fastest:.2f} m/s are commanded, but the model has its whole supply at '
                     f'{most:.2f} m/s (1/command_gain): it may be of another robot')
     said += _silences(recording)
-    return tuple(map(capitalised, said))
+    return tuple(said)
 
 
 def _silences(recording: Recording) -> list[str]:
@@ -272,7 +262,7 @@ def _silences(recording: Recording) -> list[str]:
         if series is not None and len(series):
             silent = end - float(series.times[-1])
             if silent > max(1.0, 0.05 * recording.duration):
-                said.append(f'stream {name} ends {silent:.1f} s before the commands do')
+                said.append(f'Stream {name} ends {silent:.1f} s before the commands do')
     return said
 
 

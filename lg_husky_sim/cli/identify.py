@@ -88,13 +88,14 @@ def command(
     husky = Husky(model, **settings)
     with say.stages(known=False) as report:
         if each:
+            from lg_husky_sim.api.sensor_warnings import warnings_of
             from lg_husky_sim.identification.options import with_effects
             from lg_husky_sim.identification.result import Method
             from lg_husky_sim.identification.session import fit_each, Request
             from lg_husky_sim.recording.bags import bags_in
             request = Request(
                 with_effects(husky.model, effects), husky.model, Method(method), names_in(free),
-                names_in(nuisance), names_in(profile), seed, starts, topics)
+                names_in(nuisance), names_in(profile), seed, starts, topics, warnings_of)
             paths = [str(bag) for path in recordings for bag in bags_in(Path(path))]
             table, results = fit_each(request, paths, out, jobs, scheduler,
                                       lambda word: report(f'fitting: {word}', None))

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeAlias
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.husky.model_file import ModelFile
@@ -25,6 +26,9 @@ from lg_husky_sim.recording import (
 from lg_husky_sim.reporting.data import Provenance
 from lg_husky_sim.reporting.provenance import provenance
 
+Look: TypeAlias = Callable[[Sequence[Segment], ModelFile, Collection[str]], tuple[str, ...]]
+"""What is to be warned of in recordings, beside a model and unknowns that are estimated."""
+
 
 @dataclass(frozen=True)
 class Request:
@@ -41,6 +45,7 @@ class Request:
     free, nuisance, profiles : tuple of str
     seed, starts : int
     topics : TopicMap or None
+    look : Look or None
     """
 
     model: ModelFile
@@ -52,6 +57,7 @@ class Request:
     seed: int = 0
     starts: int = STARTS
     topics: TopicMap | None = None
+    look: Look | None = None
 
 
 def read_segments(request: Request, paths: Sequence[str]) -> list[Segment]:
@@ -88,8 +94,11 @@ class _Task:
 
 
 def _fit_one(task: _Task) -> FitResult:
-    parts = read_segments(task.request, [task.path])
-    return _fit(task.request, parts, 1, None, None)
+    request = task.request
+    parts = read_segments(request, [task.path])
+    result = _fit(request, parts, 1, None, None)
+    said = request.look(parts, result.model, request.nuisance) if request.look else ()
+    return replace(result, warnings=(*said, *result.warnings))
 
 
 def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
