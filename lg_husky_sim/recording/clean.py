@@ -47,11 +47,22 @@ def clean(name: str, times: FloatArray, values: FloatArray, notes: list[str]) ->
     with np.errstate(invalid='ignore'):
         sound = np.abs(values) < LARGEST
     usable = np.any(sound, axis=1) if name == 'wheels' else np.all(sound, axis=1)
-    values = np.where(sound, values, np.nan)
+    unclean, values = values, np.where(sound, values, np.nan)
     if not np.all(usable):
-        notes.append(f'{name}: {np.count_nonzero(~usable)} of {usable.size} samples are not '
-                     f'finite or beyond {LARGEST:g} and were dropped')
+        notes.append(f'{name}: {np.count_nonzero(~usable)} of {usable.size} samples were dropped: '
+                     + _wrong(name, unclean[~usable]))
     return times[usable], values[usable]
+
+
+def _wrong(name: str, rows: FloatArray) -> str:
+    # What is wrong with rows that are of no use, each counted once.
+    missing = np.any(np.isnan(rows), axis=1)
+    # A transform has x, y and heading.
+    turned = np.isnan(rows[:, -1]) & np.all(np.isfinite(rows[:, :-1]), axis=1) & ('>' in name)
+    kinds = {'without a heading (a quaternion of zeros or no numbers)': turned,
+             'not a number': missing & ~turned, f'beyond {LARGEST:g}': ~missing}
+    return ', '.join(f'{np.count_nonzero(which)} {what}' for what, which in kinds.items()
+                     if np.any(which))
 
 
 def wheel_streams(times: FloatArray, values: FloatArray, notes: list[str]) -> dict[str, Sample]:

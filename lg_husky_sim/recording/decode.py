@@ -180,6 +180,12 @@ def _odometry(into: Collected, logged: int, message: Any) -> None:
           message.pose.pose.position, message.pose.pose.orientation)
 
 
+def _posed(into: Collected, logged: int, message: Any) -> None:
+    pose = getattr(message.pose, 'pose', message.pose)  # with its covariance, or without
+    _pose(into, logged, header_ns(message), (message.header.frame_id or 'map', 'base_link'),
+          pose.position, pose.orientation)
+
+
 def _number(name: str) -> Callable[[Collected, int, Any], None]:
     def collect(into: Collected, logged: int, message: Any) -> None:
         into.into(name, 1).add(logged, header_ns(message), (float(message.data),))
@@ -207,6 +213,8 @@ COLLECTORS: Mapping[tuple[str, str], Collector] = {
     ('pose', 'tf2_msgs/msg/TFMessage'): _transforms,
     ('pose', 'tf/msg/tfMessage'): _transforms,
     ('pose', 'nav_msgs/msg/Odometry'): _odometry,
+    ('pose', 'geometry_msgs/msg/PoseStamped'): _posed,
+    ('pose', 'geometry_msgs/msg/PoseWithCovarianceStamped'): _posed,
     ('current_left', 'std_msgs/msg/Float32'): _number('current_left'),
     ('current_left', 'std_msgs/msg/Float64'): _number('current_left'),
     ('current_right', 'std_msgs/msg/Float32'): _number('current_right'),

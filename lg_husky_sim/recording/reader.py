@@ -29,6 +29,7 @@ from lg_husky_sim.recording.topics import (
     candidates,
     listing,
     ODOMETRY,
+    POSES,
     Robots,
     robots,
     shared_transforms,
@@ -175,6 +176,9 @@ def _recording(
         if role == 'pose' and names and entry.topic.kind == ODOMETRY:
             notes.append(f'pose taken from odometry ({entry.topic.name}): if that is computed '
                          'from the wheels, their slip does not show in it')
+        if role == 'pose' and names and entry.topic.kind in POSES:
+            notes.append(f'pose taken from {entry.topic.name}, which names no frame of the robot: '
+                         'taken for that of its base')
     if not rows:
         raise RecordingError('; '.join([
             'no usable messages: commands, wheels, imu or pose', *notes,

@@ -10,13 +10,14 @@ from dataclasses import dataclass, fields, replace
 from lg_husky_sim.errors import RecordingError
 
 ODOMETRY = 'nav_msgs/msg/Odometry'
+POSES = ('geometry_msgs/msg/PoseStamped', 'geometry_msgs/msg/PoseWithCovarianceStamped')
 TRANSFORMS = ('tf2_msgs/msg/TFMessage', 'tf/msg/tfMessage')
 
 TYPES: Mapping[str, tuple[str, ...]] = {
     'command': ('geometry_msgs/msg/TwistStamped', 'geometry_msgs/msg/Twist'),
     'wheels': ('sensor_msgs/msg/JointState',),
     'imu': ('sensor_msgs/msg/Imu',),
-    'pose': (*TRANSFORMS, ODOMETRY),
+    'pose': (*TRANSFORMS, ODOMETRY, *POSES),
     'current_left': ('std_msgs/msg/Float32', 'std_msgs/msg/Float64'),
     'current_right': ('std_msgs/msg/Float32', 'std_msgs/msg/Float64'),
     'voltage': ('sensor_msgs/msg/BatteryState', 'std_msgs/msg/Float32', 'std_msgs/msg/Float64'),
@@ -51,6 +52,9 @@ PARTS = ('platform', 'sensors', 'husky_velocity_controller', 'platform_velocity_
 
 SOURCES = ('joy', 'teleop', 'marker', 'autonomous', 'external', 'nav')
 """Words in the names of command topics that are only one of several inputs of a multiplexer."""
+
+WISHES = ('goal', 'target', 'waypoint', 'setpoint', 'initial')
+"""Words in the names of poses at which the robot is not, but is to be."""
 
 NEEDS_NAME = ('current_left', 'current_right')
 """Roles whose type is so common that only a known name is taken."""
@@ -282,7 +286,10 @@ def candidates(
         generic = role == 'voltage' and topic.kind != TYPES['voltage'][0]
         if rank == len(NAMES[role]) and (role in NEEDS_NAME or generic):
             continue
-        fallback = topic.kind == ODOMETRY  # only where no tf serves
+        if topic.kind in POSES and any(word in topic.name.lower() for word in WISHES):
+            continue
+        # Only where no tf serves, and then those that name a frame of the robot first.
+        fallback = (topic.kind == ODOMETRY) + 2 * (topic.kind in POSES)
         space = _likely_space(role, topic.name)
         shared = _shared(space, topic)
         if space in robot.others and not shared:
