@@ -78,6 +78,19 @@ def test_without_commands_or_measurements_the_survey_says_what_is_missing(
     assert only.verdict == 'Not enough for a diagnosis.'
 
 
+@pytest.mark.parametrize(('stream', 'word'), [
+    ('wheels', 'No wheels (JointState)'), ('imu', 'No imu (Imu)'),
+    ('pose', 'No pose (TF, Odometry or PoseStamped)')])
+def test_a_stream_that_is_missing_is_a_reservation(
+        drive: lg.Recording, stream: str, word: str) -> None:
+    survey = with_streams(drive, **{stream: None}).info()
+    assert survey.enough
+    assert survey.verdict == 'Enough for a diagnosis, with reservations.'
+    assert [one for one in survey.warnings if one.startswith('No ')] == [
+        one for one in survey.warnings if one.startswith(word)]
+    assert any(one.startswith(word) for one in survey.warnings)
+
+
 def test_a_drive_that_hardly_moves_is_not_enough() -> None:
     times = np.arange(0.0, 6.0, 0.05)
     short = lg.Husky().simulate((times, 0.4 + 0.0 * times, 0.0 * times)).info()

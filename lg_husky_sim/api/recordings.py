@@ -263,7 +263,7 @@ def read(path: PathLike, *, topics: Topics = None) -> Recording:
         A rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag file.
     topics : mapping of str to str, optional
         Topics and frames chosen by hand, by role: command, wheels, imu, pose, current_left,
-        current_right, voltage, status, odom_frame, base_frame.
+        current_right, voltage, status, odom_frame, base_frame, left_wheels, right_wheels.
 
     Returns
     -------

@@ -22,6 +22,7 @@ from lg_husky_sim.identification.multistart import refine
 from lg_husky_sim.identification.problem import observations
 from lg_husky_sim.identification.unknowns import free_names, unknowns_of
 from lg_husky_sim.recording.recording import CONTINUOUS
+from lg_husky_sim.recording.topics import TYPES
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.yaml_files import read_yaml
@@ -33,6 +34,18 @@ if TYPE_CHECKING:
 SCHEMA = 'lg_husky_sim/survey/1'
 MOST_DECIMALS = 6
 """Most decimals of a number beside its half width."""
+
+
+CHECKED = {
+    'wheels': 'No wheels (JointState): what the motors turn is not measured, so that slip, wheel '
+              'radius and drivetrain cannot be told apart',
+    'imu': 'No imu (Imu): the yaw rate is known from other streams only, and accelerations from '
+           'none',
+    'pose': 'No pose (TF, Odometry or PoseStamped): the speed over ground is not measured, so '
+            'that slip and wheel radius cannot be told, nor whether the gyro is right'}
+"""Measurements, and what cannot be told without each."""
+CHOICE = ('; joints whose names do not tell their side are chosen by --topic left_wheels=A,B '
+          '--topic right_wheels=C,D')
 
 
 @cache
@@ -142,7 +155,7 @@ def survey(recording: Recording, model: Husky | PathLike | None = None) -> Surve
     moving, excitation = _excitation(recording)
     parameters, left_open, problem = _parameters(parts, husky)
     related = relations(parts)
-    warnings = (*_robot_warnings(recording, husky, related), *problem)
+    warnings = (*_unmeasured(recording), *_robot_warnings(recording, husky, related), *problem)
     used = set(recording.topics.values())
     return Survey(
         recording.name, recording.path, recording.duration, _streams(recording),
@@ -219,6 +232,14 @@ def _missing(recording: Recording, parts: Sequence[rec.Segment], moving: float,
         said.append(f'motion: {moving:.1f} s are commanded, {limits()["least_motion"]:g} s are '
                     'the least')
     return tuple(said)
+
+
+def _unmeasured(recording: Recording) -> tuple[str, ...]:
+    lacking = [name for name in CHECKED if name not in recording.streams]
+    if len(lacking) == len(CHECKED):
+        return ()  # nothing is measured, which is missing for a diagnosis
+    joints = any(kind in TYPES['wheels'] for kind in recording.present.values())
+    return tuple(CHECKED[name] + CHOICE * (joints and name == 'wheels') for name in lacking)
 
 
 def _related(related: Sequence[Relation]) -> Table:

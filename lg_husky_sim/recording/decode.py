@@ -16,6 +16,7 @@ from typing import Any
 from lg_husky_sim.recording.clock import Stamps
 from lg_husky_sim.recording.frames import quaternion_heading, whole_frame
 from lg_husky_sim.recording.wheels import (
+    chosen_sides,
     named_wheels,
     passed_over,
     side_means,
@@ -62,7 +63,8 @@ class Collected:
     """
     What the messages of one topic gave: rows by name, and why others gave none.
 
-    `turned` has the angles of each joint for each row of wheels, None if they do not wrap.
+    `turned` has the angles of each joint for each row of wheels, None if they do not wrap;
+    `joints` are those of the left and of the right side if they were chosen by hand.
     """
 
     rows: dict[str, Rows] = field(default_factory=dict)
@@ -70,6 +72,7 @@ class Collected:
     notes: list[str] = field(default_factory=list)
     named: bool = False
     turned: list[tuple[dict[str, float], dict[str, float]]] | None = field(default_factory=list)
+    joints: tuple[tuple[str, ...], tuple[str, ...]] | None = None
 
     def into(self, name: str, width: int) -> Rows:
         """Return the rows of a name, new ones at first."""
@@ -121,12 +124,13 @@ def _wheels(into: Collected, logged: int, message: Any) -> None:
     names = message.name
     count = max(len(message.velocity), len(message.position))
     into.seen.update(names)
-    sides = wheel_sides(names, count)
+    sides = wheel_sides(names, count) if into.joints is None else chosen_sides(
+        names, into.joints)
     if sides is None:
         return
     if not names:
         into.seen.add(f'{count} values without names')
-    named = named_wheels(tuple(names))
+    named = into.joints is None and named_wheels(tuple(names))
     if into.named and not named:
         return
     if named and not into.named:  # what came before was no wheels, but a gripper's joints

@@ -101,18 +101,22 @@ def _collect(
     found: dict[str, _Found] = {}
     while any(waiting.values()):
         attempt = {role: topics.pop(0) for role, topics in waiting.items() if topics}
-        for role, collected in _read(bag, attempt).items():
+        for role, collected in _read(bag, attempt, chosen).items():
             entry = _Found(attempt[role], collected)
             if _serves(role, entry, chosen, whose):
                 found[role] = entry
                 waiting[role] = []
             else:  # kept for the message that nothing serves
                 found.setdefault(role, entry)
+    if 'wheels' in found:
+        _check_joints(found['wheels'])
     return found
 
 
-def _read(bag: Bag | Rosbag2, attempt: Mapping[str, Topic]) -> dict[str, Collected]:
-    collected = {role: Collected() for role in attempt}
+def _read(bag: Bag | Rosbag2, attempt: Mapping[str, Topic], chosen: TopicMap
+          ) -> dict[str, Collected]:
+    joints = chosen.joints()
+    collected = {role: Collected(joints=joints) for role in attempt}
     by_topic: dict[Topic, list[str]] = {}
     for role, topic in attempt.items():
         by_topic.setdefault(topic, []).append(role)
@@ -124,6 +128,15 @@ def _read(bag: Bag | Rosbag2, attempt: Mapping[str, Topic]) -> dict[str, Collect
     for into in collected.values():
         into.settle()
     return collected
+
+
+def _check_joints(wheels: _Found) -> None:
+    # Those chosen by hand are there.
+    seen = wheels.collected.seen
+    for name in (name for side in wheels.collected.joints or () for name in side):
+        if name not in seen:
+            raise RecordingError(f'no joint {name} in {wheels.topic.name}; there are '
+                                 + (', '.join(sorted(seen)) or 'none'))
 
 
 def _serves(role: str, entry: _Found, chosen: TopicMap, whose: Robots) -> bool:

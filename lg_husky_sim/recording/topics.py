@@ -71,6 +71,8 @@ class TopicMap:
         Topic names.
     odom_frame, base_frame : str
         Parent and child frame of the pose in a tf topic.
+    left_wheels, right_wheels : str
+        Joints of each side, separated by commas, where their names do not tell it.
     """
 
     command: str = ''
@@ -83,6 +85,27 @@ class TopicMap:
     status: str = ''
     odom_frame: str = ''
     base_frame: str = ''
+    left_wheels: str = ''
+    right_wheels: str = ''
+
+    def joints(self) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
+        """
+        Return the joints of the left and of the right side that were chosen, None without.
+
+        Raises
+        ------
+        RecordingError
+            If only one side was, or a joint for both.
+        """
+        left, right = (tuple(name.strip() for name in side.split(',') if name.strip())
+                       for side in (self.left_wheels, self.right_wheels))
+        if bool(left) != bool(right):
+            raise RecordingError('left_wheels and right_wheels are chosen together, as in '
+                                 'left_wheels=A,B right_wheels=C,D')
+        both = [name for name in left if name in right]
+        if both:
+            raise RecordingError(f'{both[0]} is a joint of both sides')
+        return (left, right) if left else None
 
     @classmethod
     def parse(cls, choices: Iterable[str]) -> TopicMap:

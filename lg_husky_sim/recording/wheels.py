@@ -45,6 +45,14 @@ def wheel_sides(names: Sequence[str], count: int) -> Sides | None:
     return _sides(tuple(names), count)
 
 
+def chosen_sides(names: Sequence[str], joints: tuple[tuple[str, ...], tuple[str, ...]]
+                 ) -> Sides | None:
+    """Return the places of joints chosen for each side; None if one side has none."""
+    left, right = (tuple(place for place, name in enumerate(names) if name in side)
+                   for side in joints)
+    return (left, right) if left and right else None
+
+
 @lru_cache(maxsize=256)
 def _sides(names: tuple[str, ...], count: int) -> Sides | None:
     if not names:
