@@ -230,8 +230,9 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
                               lost[t] - t.score))
     tried = _from_the_start(evidence, base, tried)
     best = tried[0]
+    once = lost[best] if best in lost else _lost(evidence, base, [best], laws)[0]
     chance = 1.0 if is_negligible(best, evidence.noise.values) else _chance(
-        evidence, best, starts, _lost(evidence, base, [best], laws)[0])
+        evidence, best, starts, once)
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
 
 
