@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.evidence import base_clock
 from lg_husky_sim.diagnosis.evidence.base_clock import at_ticks, ticked_as, ticking
 from lg_husky_sim.diagnosis.evidence.command_steps import steps_of
 from lg_husky_sim.diagnosis.evidence.drives import Clock, Drive, drives_of
@@ -108,6 +109,31 @@ def test_the_period_of_a_base_is_found_from_two_drives(
     quiet = evidence_of(drives, ['one', 'two'], start, replace(guess, values={
         **guess.values, 'command_jitter': 1e-4}), pool)
     assert ticking(quiet, quiet.fit(start, rounds=1)) == []
+
+
+def test_ticks_in_step_with_the_commands_are_found(
+        made: Made, pool: Threads, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 20 Hz behind commands at 20 Hz, half of which just miss a tick; without a spectrum."""
+    monkeypatch.setattr(base_clock, '_promising', lambda steps: [])
+    recordings = [made('one', 0.05, 5), made('two', 0.05, 15)]
+    drives, model = drives_of(recordings), load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    guess = first_guess(drives)
+
+    def clocks(jitter: float, lag: float) -> list[list[Drive]]:
+        evidence = evidence_of(drives, ['one', 'two'], start, Noise({
+            **guess.values, 'command_jitter': jitter}), pool)
+        fit = evidence.fit(start, rounds=1)
+        places = [lag if u.name == 'lag two' else float(place) for u, place in zip(
+            fit.point.unknowns, fit.point.places, strict=True)]
+        return ticking(evidence, replace(fit, point=fit.point.at(np.array(places))))
+    for drive in clocks(0.02, 0.0)[0]:
+        assert drive.clock is not None
+        assert drive.clock.period == pytest.approx(0.05, rel=2e-4)
+    # Recordings that are late by different times tell it, too.
+    assert clocks(1e-4, 0.0) == []
+    assert clocks(1e-4, 0.01) != []
 
 
 def test_ticks_are_tried_again_with_what_was_found(

@@ -214,14 +214,41 @@ class ClockSearch:
 
     def likeliest(self) -> list[dict[str, Clock]]:
         """Return the likeliest clocks by recordings at each rate that stands out, best first."""
-        rates = self._apart(_promising([one.steps for one in self.tickers]))
-        found = _best(self.pool.map(self._tried, rates), 'clock_rates')
+        in_step = self._in_step()
+        rates = self._apart([*in_step, *_promising([one.steps for one in self.tickers])])
+        found = _best([*self.pool.map(self._tried, rates),
+                       *self.pool.map(self._prompt, in_step)], 'clock_rates')
         drift, part = setting('clock_drift'), setting('clock_shift')
         # As near as the one before tried them.
         for finer in (1.0, 3.0, 9.0):
             found = _best((self.sharpened(clocks, drift / finer, part / finer)
                            for _, clocks in found), 'clock_rivals')
         return [clocks for gain, clocks in found if gain > 0.0]
+
+    def _in_step(self) -> list[float]:
+        # Multiples of the rate at which commands come: their delays are all alike, or jump by a
+        # whole period, and no spectrum shows it.
+        spans = [(one.drive.logged.times, np.diff(one.drive.logged.times))
+                 for one in self.tickers if one.drive.logged.times.size > 1]
+        usual = float(np.median(np.concatenate([gaps for _, gaps in spans])))
+        own = (sum(float(np.sum(np.rint(gaps / usual))) for _, gaps in spans)
+               / sum(float(times[-1] - times[0]) for times, _ in spans))
+        fastest, slowest = 1.0 / setting('clock_shortest'), 1.0 / setting('clock_longest')
+        return [own * k for k in range(1, int(fastest / own) + 1) if own * k >= slowest]
+
+    def _prompt(self, rate: float) -> tuple[float, dict[str, Clock]]:
+        # The likeliest phase of each recording, by simulation, of ticks that alone make late: even
+        # ones, and those between which commands come, where a little jitter makes some late.
+        found, count, period = {}, int(setting('clock_phases')), 1.0 / rate
+        parts = (np.arange(count) + 0.5) / count
+        for name, own in self.recordings.items():
+            late = -own[0].log.get('command_delay')
+            came = np.mod(np.concatenate([one.drive.logged.times for one in own]), period)
+            clocks = [Clock(period, float(phase), late)
+                      for phase in (*(period * parts), *np.quantile(came, parts))]
+            found[name] = min(clocks, key=lambda clock, own=own: sum(  # type: ignore[misc]
+                one.cost(clock) for one in own))
+        return self.gain(found), found
 
     def _tried(self, rate: float) -> tuple[float, dict[str, Clock]]:
         drift = setting('clock_drift') * np.linspace(-1.0, 1.0, 5) / self.longest
@@ -272,11 +299,14 @@ def ticking(evidence: Evidence, fit: Fit) -> list[list[Drive]]:
     Returns
     -------
     list of list of Drive
-        Those that differ most from none first. Empty where commands jitter too little for it, are
-        at ticks already, no drive tells, or rates are likelier without ticks.
+        Those that differ most from none first. Empty where commands jitter, or are late in one
+        recording more than in another, too little for it, are at ticks already, no drive tells,
+        or rates are likelier without ticks.
         Whether these ticks make the drives likelier than none is for a fit to say.
     """
-    spread = evidence.noise.values['command_jitter']
+    # Where all commands of a recording are in step with the ticks, each has a delay of its own.
+    own = [fit.point.log.get(d.own_lag) for d in evidence.drives]
+    spread = max(evidence.noise.values['command_jitter'], max(own) - min(own))
     if spread < setting('clock_shows') or any(d.clock for d in evidence.drives):
         return []
     log = fit.point.log
