@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-import sys
 
 import click
+from lg_husky_sim.cli.ros_arguments import drive_bar
 
 MARKER = 'summary.txt'
 
@@ -41,16 +41,12 @@ def command(out: Path, manoeuvre: str, model: str) -> None:
     from lg_husky_sim.ros import api
     from lg_husky_sim.ros.demo import isolate, run_demo
     from lg_husky_sim.ros.demo_report import read_drive, save_picture, summary_lines
-    from tqdm import tqdm
 
     isolate(os.environ, domain=10 + os.getpid() % 80)
     with result_folder(out, MARKER) as made:
-        with tqdm(total=round(script.duration, 2), desc=f'driving the {script.name}',
-                  bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s',
-                  mininterval=0.1 if sys.stderr.isatty() else 5.0) as bar:
+        with drive_bar(f'driving the {script.name}', script.duration) as report:
             try:
-                demo = run_demo(script, made / 'bag', settings, model,
-                                progress=lambda moment: bar.update(moment - bar.n))
+                demo = run_demo(script, made / 'bag', settings, model, progress=report)
             except api.ExternalShutdownException:
                 # ROS 2 turns a signal into the end of the graph.
                 raise click.Abort from None

@@ -5,10 +5,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-import sys
 
 import click
-from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, RosVerb, say
+from lg_husky_sim.cli.ros_arguments import (
+    drive_bar,
+    robot_options,
+    ROS_HELP,
+    ros_tool,
+    RosVerb,
+    say,
+)
 
 
 @click.command(cls=RosVerb, short_help='Send a manoeuvre to a running node.', epilog=ROS_HELP)
@@ -30,16 +36,12 @@ def command(manoeuvre: str, preset: str | None, namespace: str | None, topic: st
     """
     from lg_husky_sim.manoeuvres import find_manoeuvre, load_manoeuvre
     from lg_husky_sim.ros.driver import drive, NAME
-    from tqdm import tqdm
 
     script = load_manoeuvre(Path(manoeuvre)) if manoeuvre.endswith(('.yaml', '.yml')) else (
         find_manoeuvre(manoeuvre))
     with ros_tool(NAME, preset or ('paper' if topic else None), namespace, wait=wait,
                   command_topic=topic, command_type=kind) as (tool, settings), \
-            tqdm(total=round(script.duration, 2), unit='s', desc=script.name,
-                 bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s',
-                 mininterval=0.1 if sys.stderr.isatty() else 5.0) as bar:
-        sent = drive(tool, script, settings, wait=wait, say=say,
-                     progress=lambda moment: bar.update(moment - bar.n))
+            drive_bar(script.name, script.duration) as report:
+        sent = drive(tool, script, settings, wait=wait, say=say, progress=report)
         topic = tool.node.resolve_topic_name(settings.command_topic)
     click.echo(f'{sent} commands sent to {topic}')

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 from lg_husky_sim.cli.common import topics_option
-from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, RosVerb, say
+from lg_husky_sim.cli.ros_arguments import (
+    drive_bar,
+    robot_options,
+    ROS_HELP,
+    ros_tool,
+    RosVerb,
+    say,
+)
 
 if TYPE_CHECKING:
     from lg_husky_sim.recording import TopicMap
@@ -34,13 +41,11 @@ def command(recording: Path, preset: str | None, namespace: str | None, topics: 
     """
     from lg_husky_sim.recording import read_recording
     from lg_husky_sim.ros.player import NAME, play
-    from tqdm import tqdm
 
     read = read_recording(recording, topics)
     longest = max(series.times[-1] for series in read.streams.values() if len(series))
     with ros_tool(NAME, preset, namespace, wait=wait) as (tool, settings), \
-            tqdm(total=round(float(longest), 2), desc=read.name, disable=None,
-                 bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s') as bar:
+            drive_bar(read.name, float(longest)) as report:
         sent = play(tool, read.streams, settings, wait=wait, speed=speed, say=say,
-                    progress=lambda moment: bar.update(moment - bar.n))
+                    progress=report)
     click.echo(f'{sent} messages sent')

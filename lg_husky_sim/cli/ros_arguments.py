@@ -108,6 +108,18 @@ def ros_tool(name: str, preset: str | None, namespace: str | None, *, wait: floa
         raise click.Abort from None
 
 
+@contextmanager
+def drive_bar(name: str, seconds: float) -> Iterator[Callable[[float], object]]:
+    """Show how far a drive is, told its moment [s]: a bar on a terminal, elsewhere a line."""
+    from tqdm import tqdm
+
+    with tqdm(total=round(seconds, 2), desc=name, disable=None,
+              bar_format='{desc}: {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s') as bar:
+        if bar.disable:
+            click.echo(f'{name}: {seconds:.1f} s', err=True)
+        yield lambda moment: bar.update(moment - bar.n)
+
+
 def say(text: str) -> None:
     """Print a line on standard error, where it disturbs no output; a bar there is drawn anew."""
     from tqdm import tqdm

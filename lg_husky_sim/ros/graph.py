@@ -6,11 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+import posixpath
+from types import MappingProxyType
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.ros import api
 from lg_husky_sim.ros.settings import BY_NAME, make_settings, Settings
 
+#: Settings that name what a robot is known by, beside its preset.
+NAMED = ('command_topic', 'command_type', 'odometry_topic', 'joint_states_topic', 'imu_topic')
 #: Nodes of ours that only listen or only talk; none of them is a robot.
 TOOLS = ('lg_husky_driver', 'lg_husky_player', 'lg_husky_recorder', 'lg_husky_twin',
          'lg_husky_look')
@@ -105,7 +109,8 @@ def roles(settings: Settings) -> dict[str, tuple[str, str]]:
 
 
 def find_robots(topics: Mapping[str, Iterable[str]], *, preset: str | None = None,
-                namespace: str | None = None) -> tuple[Robot, ...]:
+                namespace: str | None = None, named: Mapping[str, object] = MappingProxyType({})
+                ) -> tuple[Robot, ...]:
     """
     Return the Huskies among the topics of a graph.
 
@@ -118,6 +123,8 @@ def find_robots(topics: Mapping[str, Iterable[str]], *, preset: str | None = Non
         Full names and types of the topics in the graph.
     preset, namespace : str, optional
         Look for these only.
+    named : mapping of str to object
+        Settings of :data:`NAMED` that count instead of the presets' own.
 
     Returns
     -------
@@ -127,18 +134,22 @@ def find_robots(topics: Mapping[str, Iterable[str]], *, preset: str | None = Non
 
     """
     best: dict[str, Robot] = {}
+    home = f'/{(namespace or "").strip("/")}'
     for name in (preset,) if preset is not None else BY_NAME['preset'].choices:
-        wanted = roles(make_settings(preset=name))
-        places = {f'/{topic.removesuffix(wanted[role][0]).strip("/")}'
-                  for role in ('command', 'odometry') for topic, kinds in topics.items()
-                  if topic.endswith(f'/{wanted[role][0]}') and wanted[role][1] in kinds}
+        wanted = roles(make_settings(named, preset=name))
+        # A topic with a leading slash is below no namespace.
+        places = {home if ending.startswith('/') else f'/{topic.removesuffix(ending).strip("/")}'
+                  for ending, kind in (wanted['command'], wanted['odometry'])
+                  for topic, kinds in topics.items()
+                  if topic.endswith(f'/{ending.lstrip("/")}') and kind in kinds
+                  and (topic == ending or not ending.startswith('/'))}
         for place in places:
-            matched = sum(kind in topics.get(f'{place.rstrip("/")}/{topic}', ())
+            matched = sum(kind in topics.get(posixpath.join(place, topic), ())
                           for topic, kind in wanted.values())
             if place not in best or matched > best[place].matched:
                 best[place] = Robot(place, name, matched)
     return tuple(best[place] for place in sorted(best)
-                 if namespace is None or place == f'/{namespace.strip("/")}')
+                 if namespace is None or place == home)
 
 
 def the_one(robots: tuple[Robot, ...]) -> Robot | None:

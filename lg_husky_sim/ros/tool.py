@@ -15,7 +15,7 @@ from typing import Any
 
 from lg_husky_sim.errors import CommandError, SettingsError
 from lg_husky_sim.ros import api
-from lg_husky_sim.ros.graph import find_robots, Robot, the_one
+from lg_husky_sim.ros.graph import find_robots, NAMED, Robot, the_one
 from lg_husky_sim.ros.parameters import given_settings
 from lg_husky_sim.ros.settings import BY_NAME, DEFAULT_PRESET, make_settings, Settings
 
@@ -224,8 +224,8 @@ def joined(arguments: Sequence[str] = ()) -> Iterator[Orderly]:
             api.try_shutdown()
 
 
-def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wait: float
-             ) -> Robot | None:
+def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wait: float,
+             named: Mapping[str, object]) -> Robot | None:
     """
     Look for the Husky in the graph.
 
@@ -236,6 +236,8 @@ def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wai
         Look for these only.
     wait : float
         How long to look for the first [s]; for others, :data:`OTHERS` longer.
+    named : mapping of str to object
+        Topics and types by which to look for it, by setting.
 
     Returns
     -------
@@ -254,7 +256,7 @@ def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wai
         seen = False
         while True:
             topics = dict(tool.node.get_topic_names_and_types())
-            robots = find_robots(topics, preset=preset, namespace=namespace)
+            robots = find_robots(topics, preset=preset, namespace=namespace, named=named)
             if robots and not seen:
                 seen = True
                 end = time.monotonic() + OTHERS
@@ -302,14 +304,17 @@ def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = N
     remapped = _said(arguments, '__ns')
     place = namespace or remapped or os.environ.get('ROS_NAMESPACE') or None
     if preset is None or place is None:
+        named = {name: said for name in NAMED if (said := _said(arguments, name)) is not None}
         robot = look_for(orderly, preset=preset, namespace=place, wait=wait if preset is None
-                         else min(wait, OTHERS))
+                         else min(wait, OTHERS), named=named)
         if robot is not None:
             preset, place = robot.preset, place or robot.namespace
         elif preset is None:
             where = f'below {place} ' if place else ''
+            by = ', '.join(f'{name} {said}' for name, said in named.items())
             raise CommandError(
-                f'no robot is {where}in the graph ({api.describe_backend()}) after {wait:g} s; '
+                f'no robot {f"with {by} " if by else ""}is {where}in the graph '
+                f'({api.describe_backend()}) after {wait:g} s; '
                 f'start it, or name its topics: --preset {DEFAULT_PRESET} or '
                 f'{", ".join(BY_NAME["preset"].choices[1:])}')
     return preset, None if remapped and not namespace else place

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import time
 
-from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.errors import CommandError, SettingsError
 from lg_husky_sim.ros.graph import find_robots, Robot, the_one
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.ros.tool import choose, Orderly, Tool
@@ -36,6 +37,38 @@ def test_huskies_are_found_by_names_and_types_together() -> None:
     with pytest.raises(SettingsError, match='2 Huskies are in the graph, choose one: --preset '
                        'husky_ros1; --preset clearpath_jazzy --namespace /a200_0000'):
         the_one(find_robots(both))
+
+
+def test_a_robot_is_found_by_topics_that_are_named() -> None:
+    topics = {'/scout/drive/command': ['geometry_msgs/msg/TwistStamped'],
+              '/scout/wheel_odom': ['nav_msgs/msg/Odometry'],
+              '/scout/imu/raw': ['sensor_msgs/msg/Imu']}
+    named = {'odometry_topic': 'wheel_odom', 'imu_topic': 'imu/raw',
+             'command_topic': 'drive/command', 'command_type': 'TwistStamped'}
+    assert find_robots(topics) == ()
+    robot = the_one(find_robots(topics, named=named))
+    assert robot == Robot('/scout', 'paper', 3)
+    assert find_robots(topics, namespace='scout', named=named) == (robot,)
+    absolute = {'odometry_topic': '/scout/wheel_odom'}
+    for place in (None, '/scout'):
+        found, = find_robots(topics, namespace=place, named=absolute)
+        assert found.namespace == (place or '/')
+
+
+def test_the_names_of_ros_arguments_are_looked_for(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ['-p', 'odometry_topic:=wheel_odom', '-p', 'rate:=20.0', '-p', 'imu_topic:=imu/raw']
+    asked = []
+
+    def find(topics: object, *, named: Mapping[str, object], **only: object) -> tuple[Robot, ...]:
+        asked.append(named)
+        return ()
+    monkeypatch.setattr('lg_husky_sim.ros.tool.find_robots', find)
+    with Orderly() as orderly, pytest.raises(CommandError, match=(
+            r'^no robot with odometry_topic wheel_odom, imu_topic imu/raw is below /scout in the '
+            'graph')):
+        choose(orderly, words, namespace='/scout', wait=0.1)
+    assert asked[0] == {'odometry_topic': 'wheel_odom', 'imu_topic': 'imu/raw'}
 
 
 @pytest.mark.parametrize('preset', [None, 'clearpath_jazzy'])

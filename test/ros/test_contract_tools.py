@@ -93,7 +93,7 @@ def test_a_drive_that_is_ended_stops_the_robot(probe: Probe, tmp_path: Path, end
     finally:
         process.kill()
         process.wait()
-    # On a line of its own, not behind the bar.
+    assert '%|' not in said  # no bar where nobody watches
     assert f'{COMMAND} moves /probe (Twist); no limit in this preset' in said.splitlines()
     assert 'Traceback' not in said
     if end != 'parent':
