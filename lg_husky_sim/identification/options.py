@@ -28,7 +28,8 @@ def effect_in(text: str) -> Effect:
     name, *rest = text.split(':', 2)
     kind = Effect(name).kind
     if len(rest) == 1:
-        return Effect(name, '', rest[0]) if rest[0] in kind.shapes else Effect(name, rest[0])
+        formed = rest[0] in kind.shapes or (kind.sides == ('none',) and any(kind.shapes))
+        return Effect(name, '', rest[0]) if formed else Effect(name, rest[0])
     side, shape = rest if rest else ('', '')
     return Effect(name, side, shape)
 

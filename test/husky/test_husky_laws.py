@@ -15,7 +15,7 @@ import pytest
 # Which coefficients and arguments each law takes.
 COEFFICIENTS = {
     Law.COULOMB: 4, Law.QUADRATIC: 1, Law.WHILE_MOVING: 2, Law.MODULATED_DAMPING: 1,
-    Law.HEADING: 2, Law.WHEEL_PHASE: 6, Law.SLIP_SATURATION: 2, Law.CURRENT_LIMIT: 3,
+    Law.HEADING: 2, Law.WHEEL_PHASE: 8, Law.SLIP_SATURATION: 2, Law.CURRENT_LIMIT: 3,
     Law.DEAD_ZONE: 1, Law.DEAD_BAND: 2, Law.SOFT_BAND: 1, Law.CLIP: 1, Law.BUS_SAG: 2,
     Law.DROOP: 2,
     Law.HEATING: 3, Law.BACKLASH: 3, Law.FRICTION_CIRCLE: 3, Law.STICTION: 5,
