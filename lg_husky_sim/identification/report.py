@@ -69,10 +69,11 @@ def report_paths(out: Path) -> tuple[Path, ...]:
     if out.suffix not in ('.yaml', '.yml'):
         raise SettingsError(f'{out}: a model file ends in .yaml or .yml')
     text, data, html = (out.with_suffix(end) for end in ('.txt', '.json', '.html'))
-    check_ours(out, BEGINNING)
     check_ours(data, f'{{\n "schema": "{SCHEMA}"')
+    # Beside the JSON of a fit they are the fit's; a model file without one is of a person.
+    check_ours(out, BEGINNING if data.is_file() else '')
     for path in (text, html):
-        if path.is_dir() or not data.is_file():  # beside the JSON of a fit, they are the fit's
+        if path.is_dir() or not data.is_file():
             check_ours(path, '')
     return out, text, data, html
 

@@ -28,6 +28,7 @@ from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
 from lg_husky_sim.diagnosis.sensors.relations import by_names, relations
 from lg_husky_sim.diagnosis.sensors.repair import begun_with, certain, fault_findings
 from lg_husky_sim.diagnosis.sensors.robot import differences, impossible, misread
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
@@ -244,6 +245,7 @@ def test_tyres_that_slip_by_a_resistance_are_no_smaller_wheels(
     related = relations(segments(record('slips', plant, steps, 3)))
     speed = by_names(related)['speed', 'wheels', 'pose']
     assert speed.factor.value < 0.6 * model.parameters['wheel_radius']
+    assert speed.explained < setting('proportional')
     assert differences(related, model.parameters) == ()
 
 

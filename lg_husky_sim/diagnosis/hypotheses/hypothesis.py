@@ -196,6 +196,11 @@ def with_effects(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Poin
     base = [place for place, unknown in enumerate(final.unknowns) if unknown.kind != 'effect']
     point = replace(plain, reading=final.reading, places=np.array(final.places[base]),
                     unknowns=tuple(final.unknowns[place] for place in base))
+    return having(point, final, kept)
+
+
+def having(point: Point, final: Point, kept: Sequence[Hypothesis]) -> Point:
+    """Return a point with effects as they were fitted, all else as it is."""
     for one in kept:
         point = one.point(point, {p.name: final.values[p.name] for p in one.free})
     return point

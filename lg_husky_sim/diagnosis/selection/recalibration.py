@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted, Tried
 from lg_husky_sim.diagnosis.selection.screening import Look, look
-from lg_husky_sim.diagnosis.selection.ticks import near_ticks, ticked
+from lg_husky_sim.diagnosis.selection.ticks import likelier_ticks, ticked
 from lg_husky_sim.diagnosis.settings import setting
 
 
@@ -123,8 +123,8 @@ def at_ticks(known: Recalibrated, start: Point, rivals: Sequence[Sequence[Drive]
         lacks something else then, which the ticks may be a part of.
     """
     # From where delays have not taken their place.
-    near = near_ticks(known.first, (known.evidence, known.base), start, rivals)
-    if near is None:
+    drives = likelier_ticks(known.first, (known.evidence, known.base), start, rivals)
+    if drives is None:
         return None
-    other = recalibrated(*ticked(known.first, start, near.drives))
+    other = recalibrated(*ticked(known.first, start, drives))
     return None if is_distorted(other.base) else other

@@ -13,6 +13,7 @@ from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened, start_of
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
+    having,
     hypotheses,
     Hypothesis,
     Numbers,
@@ -201,13 +202,6 @@ def as_usual(point: Point) -> Point:
     return replace(point, reading=Reading(), unknowns=unknowns, places=places)
 
 
-def _having(initial: Point, final: Point, found: Sequence[Hypothesis]) -> Point:
-    # The initial point with effects as they were fitted, all else as it begins.
-    for one in found:
-        initial = one.point(initial, {p.name: final.values[p.name] for p in one.free})
-    return initial
-
-
 def _without_the_dropped(rounds: Sequence[Round], found: Sequence[Hypothesis],
                          kept: Sequence[Hypothesis]) -> list[Round]:
     # There is always one that says what was looked at last, adopted or not.
@@ -292,7 +286,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         found.append(best.hypothesis)
         evidence, base = _settled(evidence, best.fit.point, known.first)
         # What was found may have distorted the robot with and without ticks: they are tried again.
-        other = at_ticks(replace(known, evidence=evidence, base=base), _having(
+        other = at_ticks(replace(known, evidence=evidence, base=base), having(
             initial, base.point, found), rivals) if rivals else None
         if other is not None:
             known, rivals, ticks = other, [], True

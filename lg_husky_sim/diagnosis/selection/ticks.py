@@ -15,7 +15,7 @@ than the best of so many would be by chance.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Drive
@@ -25,26 +25,6 @@ from lg_husky_sim.diagnosis.evidence.unknowns import start_of, tick_unknowns
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.diagnosis.settings import setting
 import numpy as np
-
-
-@dataclass(frozen=True, eq=False)
-class Ticked:
-    """
-    A model whose base applies commands at ticks.
-
-    Parameters
-    ----------
-    drives : sequence of Drive
-        With commands at these ticks.
-    evidence : Evidence
-        With the noise of the fit.
-    fit : Fit
-        Under that.
-    """
-
-    drives: Sequence[Drive]
-    evidence: Evidence
-    fit: Fit
 
 
 def ticked(evidence: Evidence, point: Point, drives: Sequence[Drive]) -> tuple[Evidence, Point]:
@@ -58,10 +38,10 @@ def ticked(evidence: Evidence, point: Point, drives: Sequence[Drive]) -> tuple[E
     return evidence_of(drives, evidence.names, wider, evidence.noise, evidence.pool), wider
 
 
-def near_ticks(first: Evidence, plain: tuple[Evidence, Fit], start: Point,
-               rivals: Sequence[Sequence[Drive]]) -> Ticked | None:
+def likelier_ticks(first: Evidence, plain: tuple[Evidence, Fit], start: Point,
+                   rivals: Sequence[Sequence[Drive]]) -> Sequence[Drive] | None:
     """
-    Return a model fitted at the likeliest of some ticks, if these are likelier than none.
+    Return drives with commands at the likeliest of some ticks, if these are likelier than none.
 
     Parameters
     ----------
@@ -78,9 +58,7 @@ def near_ticks(first: Evidence, plain: tuple[Evidence, Fit], start: Point,
         ticked(first, start, drives) for drives in rivals)]
     best = min(range(len(afresh)), key=lambda k: afresh[k][1].cost)
     near = calibrated(afresh[best][0], afresh[best][1].point, 1)
-    if not ticks_are_likelier(plain, near, rivals[best]):
-        return None
-    return Ticked(rivals[best], *near)
+    return rivals[best] if ticks_are_likelier(plain, near, rivals[best]) else None
 
 
 def ticks_are_likelier(plain: tuple[Evidence, Fit], ticked: tuple[Evidence, Fit],

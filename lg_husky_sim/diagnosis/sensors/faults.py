@@ -168,7 +168,7 @@ def _dead(every: Known) -> list[Fault]:
     least = setting('least_explained')
     if turn is None or both is None or turn.explained < least or both.explained > least:
         return []
-    if max(abs(both.factor.low), abs(both.factor.high)) > setting('no_ground') * abs(
+    if max(abs(both.factor.low), abs(both.factor.high)) > setting('no_reaction') * abs(
             turn.factor.value):
         return []
     return [Fault(None, 'imu', None, _beyond(turn.factor, 0.0, 0.0),
@@ -187,7 +187,7 @@ def _commanded(known: Known) -> list[Fault]:
                       'The robot turns against its commands: the sign of the commanded yaw rate '
                       'is wrong')]
     unit = unit_of(one.factor.value)
-    if unit is None or one.factor.value > setting('no_ground'):
+    if unit is None or one.factor.value > setting('no_reaction'):
         return []
     return [Fault(None, 'command', None, sure,
                   f'The robot turns {one.factor.value:.3f} of what it is told to: commanded yaw '
