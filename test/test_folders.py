@@ -151,7 +151,7 @@ def test_files_of_a_user_are_never_replaced(tmp_path: Path) -> None:
     for _ in range(2):  # the second time over its like
         lg.Husky(mass=60.0).save(model)
         drive.save_tum(way)
-    with pytest.raises(SettingsError, match='a.yaml exists and is no such result'):
+    with pytest.raises(SettingsError, match=r'a\.yaml exists and is no such result'):
         report_paths(model)  # a model, but no fit: somebody's robot
     for path in (model, way, plan, tmp_path / 'b.txt', tmp_path / 'bag.foxglove.json'):
         path.write_text('my own\n')
