@@ -9,9 +9,9 @@ from dataclasses import replace
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.diagnose import diagnose
-from lg_husky_sim.diagnosis.evidence import base_clock
-from lg_husky_sim.diagnosis.evidence.base_clock import at_ticks, ticked_as, ticking
-from lg_husky_sim.diagnosis.evidence.command_steps import steps_of
+from lg_husky_sim.diagnosis.evidence import clock_search
+from lg_husky_sim.diagnosis.evidence.base_clock import ticked_as, ticker_of, ticking
+from lg_husky_sim.diagnosis.evidence.clock_search import at_ticks
 from lg_husky_sim.diagnosis.evidence.drives import Clock, Drive, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, Noise
@@ -114,7 +114,7 @@ def test_the_period_of_a_base_is_found_from_two_drives(
 def test_ticks_in_step_with_the_commands_are_found(
         made: Made, pool: Threads, monkeypatch: pytest.MonkeyPatch) -> None:
     """At 20 Hz behind commands at 20 Hz, half of which just miss a tick; without a spectrum."""
-    monkeypatch.setattr(base_clock, '_promising', lambda steps: [])
+    monkeypatch.setattr(clock_search, '_promising', lambda steps: [])
     recordings = [made('one', 0.05, 5), made('two', 0.05, 15)]
     drives, model = drives_of(recordings), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
@@ -179,8 +179,9 @@ def test_delays_of_single_steps_are_those_to_the_next_tick(made: Made) -> None:
     drive = drives_of([made('one', PERIOD, 1)])[0]
     model = load_model()
     plant = compile_model(model.structure).at(model.parameters)
-    known = steps_of(plant, drive, Reading(values={'command_delay': 0.5 * PERIOD}), 0.02)
-    assert known is not None
+    ticker = ticker_of(plant, drive, Reading(values={'command_delay': 0.5 * PERIOD}), 0.02)
+    assert ticker is not None
+    known = ticker.steps
     assert np.corrcoef(np.mod(0.011 - known.stamps, PERIOD), known.delays)[0, 1] > 0.8
     cost = known.clock_costs(np.array([PERIOD]), 0.011, 40).cost[0]
     assert int(np.argmin(cost)) in {37, 38, 39, 0, 1, 2, 3}
@@ -197,8 +198,8 @@ def test_steps_that_no_rate_shows_tell_nothing(made: Made) -> None:
         'pose': recording.streams['pose']})
     model = load_model()
     plant = compile_model(model.structure).at(model.parameters)
-    assert steps_of(plant, drives_of([alone])[0], Reading(), 0.02) is None
-    assert steps_of(plant, drives_of([recording])[0], Reading(), 0.02) is not None
+    assert ticker_of(plant, drives_of([alone])[0], Reading(), 0.02) is None
+    assert ticker_of(plant, drives_of([recording])[0], Reading(), 0.02) is not None
 
 
 def test_a_clean_base_that_ticks_lacks_nothing(made: Made) -> None:

@@ -12,22 +12,18 @@ s, by::
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
-from lg_husky_sim.diagnosis.evidence.observation import observe, simulate
-from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, identity
 from scipy.sparse.linalg import spsolve
 
-_RATES = (Channel.WHEEL_LEFT, Channel.WHEEL_RIGHT, Channel.YAW_RATE)
-_ANGLES = (Channel.ANGLE_LEFT, Channel.ANGLE_RIGHT)
+#: Residuals of rates, each with its times [s].
+Rates = Sequence[tuple[FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +58,12 @@ class Steps:
     def late(self) -> float:
         """The mean delay [s]."""
         return float(self.weights @ self.delays / np.sum(self.weights))
+
+    @property
+    def scatter(self) -> float:
+        """The standard deviation of the delays [s]."""
+        return float(np.sqrt(self.weights @ (self.delays - self.late) ** 2
+                             / np.sum(self.weights)))
 
     def clock_costs(self, periods: FloatArray, origin: float, count: int) -> ClockCosts:
         """
@@ -121,18 +123,7 @@ class ClockCosts:
         return best, np.take_along_axis(cost, best[:, None], axis=1)[:, 0]
 
 
-def rated(drive: Drive, values: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-    """Return rates of wheels and yaw, or what angles change by, each with its times."""
-    found = []
-    for channel in (*_RATES, *_ANGLES):
-        rows = drive.slice_of(channel)
-        if rows.stop > rows.start:
-            own, times = values[rows], drive.times[rows]
-            found.append((own, times) if channel in _RATES else (np.diff(own), times[1:]))
-    return found
-
-
-def scaled(rates: Sequence[tuple[FloatArray, FloatArray]], scales: Sequence[float]) -> FloatArray:
+def scaled(rates: Rates, scales: Sequence[float]) -> FloatArray:
     """Return all of them in one, each over its scale."""
     return np.concatenate([own * scale for (own, _), scale in zip(rates, scales, strict=True)])
 
@@ -149,17 +140,24 @@ def _late(commands: TimeSeries, chosen: NDArray[np.intp], by: float) -> TimeSeri
     return TimeSeries(every, held, commands.names)
 
 
-def steps_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Steps | None:
+def steps_of(commands: TimeSeries, span: tuple[float, float],
+             read: Callable[[TimeSeries], Rates], delay: float, early: float, spread: float
+             ) -> Steps | None:
     """
     Return when each step of a drive's commands seems to have come.
 
     Parameters
     ----------
-    plant : Plant
-        As it is in the drive's recording.
-    drive : Drive
-        With the commands as they come.
-    log : Reading
+    commands : TimeSeries
+        As they come.
+    span : tuple of float
+        Start and end of the drive [s].
+    read : callable
+        Returns the residuals of the rates with some commands.
+    delay : float
+        From a command to its effect [s].
+    early : float
+        Time before its effect in which rates show it already [s].
     spread : float
         What delays vary by [s].
 
@@ -168,11 +166,9 @@ def steps_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Steps |
     Steps or None
         None where no rate or no step of a command is known, or none shows in a rate.
     """
-    commands = drive.commands
     moved = np.flatnonzero(np.any(np.diff(commands.values, axis=0) != 0.0, axis=1)) + 1
-    moved = moved[(commands.times[moved] > drive.start) & (commands.times[moved] < drive.end)]
-    plain = observe(simulate(plant, drive, log), drive, log)
-    rates = rated(drive, drive.measured - plain)
+    moved = moved[(commands.times[moved] > span[0]) & (commands.times[moved] < span[1])]
+    rates = read(commands)
     if moved.size < int(setting('clock_steps')) or not rates:
         return None
     # Of what is steady, for the linear problem.
@@ -183,16 +179,13 @@ def steps_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Steps |
     count = max(2, int(np.ceil((window + by) / usual)))
     order = np.argsort(times, kind='stable')
     stamps = commands.times[moved]
-    delay = log.get('command_delay')
     rows, columns, values = [], [], []
     for first in range(count):
         chosen = np.arange(first, moved.size, count)
-        later = replace(drive, commands=_late(commands, moved[chosen], by))
-        change = scaled(rated(drive, observe(
-            simulate(plant, later, log), later, log) - plain), scales) / by
+        change = (residual - scaled(read(_late(commands, moved[chosen], by)), scales)) / by
         for k in chosen:
             begin, end = np.searchsorted(times[order], stamps[k] + delay + np.array([
-                -log.get('wheel_window'), window]))
+                -early, window]))
             own = order[begin:end]
             rows.append(own)
             columns.append(np.full(own.size, k))

@@ -15,13 +15,13 @@ lowers the cost by, in nats: a likelihood ratio of exp(gain).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
 from lg_husky_sim.diagnosis.evidence.deviation import slow_model
 from lg_husky_sim.diagnosis.evidence.differences import Differences
-from lg_husky_sim.diagnosis.evidence.drives import Drive
+from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.frames import frame_of
 from lg_husky_sim.diagnosis.evidence.noise import (
     fit_noise,
@@ -37,7 +37,7 @@ from lg_husky_sim.diagnosis.evidence.repaired_commands import repaired
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.signals import FloatArray, TimeSeries
 from lg_husky_sim.threads import Threads
 import numpy as np
 
@@ -261,9 +261,19 @@ class Evidence:
 
         def one_of(number: int) -> Drive:
             drive, whitener = self.drives[number], self.whiteners[number]
-            whitened = fit.whitened[ends[number] - drive.measured.size:ends[number]]
-            return repaired(drive, whitener, whitened, lambda other: whitener.apply(
-                other.measured - observe(simulate(plants[number], other, log), other, log)))
+            order = whitener.frame.order
+            wheels = ~np.isin(drive.channels[order], [int(c) for c in (
+                Channel.X, Channel.Y, Channel.HEADING)])
+
+            def score(commands: TimeSeries) -> FloatArray:
+                other = replace(drive, commands=commands)
+                return whitener.apply(other.measured - observe(
+                    simulate(plants[number], other, log), other, log))
+            known = drive.commands is drive.logged
+            e = fit.whitened[ends[number] - drive.measured.size:ends[number]]
+            got = repaired(drive.logged, e if known else score(drive.logged), wheels,
+                           whitener.frame.times[order], score)
+            return drive if got is drive.commands else replace(drive, commands=got)
         return list(self.pool.map(one_of, range(len(self.drives))))
 
     def about(self, point: Point) -> Evidence:

@@ -5,22 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 from lg_husky_sim.diagnosis.evidence import student
-from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
-from lg_husky_sim.diagnosis.evidence.noise import Whitener
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
+from numpy.typing import NDArray
 
 #: Innovations of a drive when its base is driven by other commands than those of the log.
-Score = Callable[[Drive], FloatArray]
+Score = Callable[[TimeSeries], FloatArray]
 
 
-def repaired(drive: Drive, whitener: Whitener, whitened: FloatArray, score: Score) -> Drive:
+def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_],
+             times: FloatArray, score: Score) -> TimeSeries:
     """
-    Return a drive with the commands that its base seems to have got.
+    Return the commands that a base seems to have got.
 
     Where the wheels leave a simulation by far more than noise, a command is taken out, acts later,
     or is put into a gap between those before and after it, if that makes the drive likelier by a
@@ -28,36 +27,33 @@ def repaired(drive: Drive, whitener: Whitener, whitened: FloatArray, score: Scor
 
     Parameters
     ----------
-    drive : Drive
-    whitener : Whitener
-        That made the innovations.
+    logged : TimeSeries
     whitened : numpy.ndarray, shape (n,)
-        Of the drive, in the order of time.
+        Innovations of the drive with these.
+    wheels : numpy.ndarray of bool, shape (n,)
+        Which of them are those of wheels and of what moves with them.
+    times : numpy.ndarray, shape (n,)
+        Their stamps [s].
     score : callable
         Returns the innovations with other commands.
 
     Returns
     -------
-    Drive
+    TimeSeries
+        The same object where none is repaired.
     """
-    stamps = drive.logged.times
+    stamps = logged.times
     if stamps.size <= 3:
-        return drive
+        return logged
     most = int(setting('missed_share') * stamps.size) + 1
-    plain = drive if drive.commands is drive.logged else replace(drive, commands=drive.logged)
-    order = whitener.frame.order
-    wheel = drive.channels[order] != int(Channel.X)
-    for known in (Channel.Y, Channel.HEADING):
-        wheel &= drive.channels[order] != int(known)
-    e = whitened if drive is plain else score(plain)
-    best, cost = plain, student.cost(e)
+    best, e, cost = logged, whitened, student.cost(whitened)
     tried: set[int] = set()
     for _ in range(most):
-        far = wheel & (np.abs(e) > setting('far'))
+        far = wheels & (np.abs(e) > setting('far'))
         if not np.any(far):
             break
         found = None
-        for place in _suspects(whitener.frame.times[order][far], np.abs(e[far]), stamps):
+        for place in _suspects(times[far], np.abs(e[far]), stamps):
             if place in tried:
                 continue
             tried.add(place)
@@ -84,33 +80,30 @@ def _suspects(times: FloatArray, sizes: FloatArray, stamps: FloatArray) -> list[
     return found
 
 
-def _others(drive: Drive, stamp: float, score: Score) -> Iterator[tuple[Drive, FloatArray]]:
+def _others(commands: TimeSeries, stamp: float, score: Score
+            ) -> Iterator[tuple[TimeSeries, FloatArray]]:
     # Without the command at a stamp, with it late, and with one in the middle of the gap after it.
-    commands = drive.commands
     place = int(np.argmin(np.abs(commands.times - stamp)))
     keep = np.arange(commands.times.size) != place
-    without = replace(drive, commands=TimeSeries(
-        commands.times[keep], commands.values[keep], commands.names))
+    without = TimeSeries(commands.times[keep], commands.values[keep], commands.names)
     yield without, score(without)
     gaps = np.diff(commands.times)
     usual = float(np.median(gaps))
-    yield _held(drive, place, usual, score)
+    yield _held(commands, place, usual, score)
     if place < gaps.size and setting('lost_gap') * usual < gaps[place] < (
             setting('pause') * usual):
-        yield _filled(drive, place, round(float(gaps[place]) / usual) - 1, score)
+        yield _filled(commands, place, round(float(gaps[place]) / usual) - 1, score)
 
 
-def _held(drive: Drive, place: int, usual: float, score: Score) -> tuple[Drive, FloatArray]:
+def _held(commands: TimeSeries, place: int, usual: float, score: Score
+          ) -> tuple[TimeSeries, FloatArray]:
     # With a command that came late by so many usual gaps; those behind it waited for it.
-    commands = drive.commands
-
-    def late(gaps: float) -> tuple[float, float, Drive, FloatArray]:
+    def late(gaps: float) -> tuple[float, float, TimeSeries, FloatArray]:
         until = commands.times[place] + gaps * usual
         times = np.array(commands.times)
         times[place:] = np.maximum(times[place:], until)
         last = np.append(np.diff(times) > 0.0, True)
-        other = replace(drive, commands=TimeSeries(
-            times[last], commands.values[last], commands.names))
+        other = TimeSeries(times[last], commands.values[last], commands.names)
         e = score(other)
         return student.cost(e), gaps, other, e
     best = min((late(gaps) for gaps in (0.5, 1.5, 2.5)), key=lambda one: one[0])
@@ -120,20 +113,19 @@ def _held(drive: Drive, place: int, usual: float, score: Score) -> tuple[Drive, 
     return best[2], best[3]
 
 
-def _filled(drive: Drive, place: int, count: int, score: Score) -> tuple[Drive, FloatArray]:
+def _filled(commands: TimeSeries, place: int, count: int, score: Score
+            ) -> tuple[TimeSeries, FloatArray]:
     # With so many commands in a gap, between those before and after it but for what the readings
     # say that they were: linear in both numbers.
-    commands = drive.commands
     before, after = commands.values[place:place + 2]
     parts = np.arange(1, count + 1)[:, None] / (count + 1.0)
     times = commands.times[place] + parts[:, 0] * (
         commands.times[place + 1] - commands.times[place])
 
-    def other(shift: FloatArray) -> Drive:
+    def other(shift: FloatArray) -> TimeSeries:
         values = before + parts * (after - before) + shift
-        return replace(drive, commands=TimeSeries(
-            np.insert(commands.times, place + 1, times),
-            np.insert(commands.values, place + 1, values, axis=0), commands.names))
+        return TimeSeries(np.insert(commands.times, place + 1, times),
+                          np.insert(commands.values, place + 1, values, axis=0), commands.names)
     plain = other(np.zeros(2))
     e = score(plain)
     step = np.maximum(np.abs(after - before), setting('still_speed'))

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-import math
 
+from lg_husky_sim.diagnosis.evidence.clock_search import gain_by_chance
 from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -75,7 +75,11 @@ def ticks_are_likelier(plain: tuple[Evidence, Fit], ticked: tuple[Evidence, Fit]
     """
     before, after = (evidence.surprise(fit) for evidence, fit in (
         calibrated(evidence, any_lateness(fit.point), 1) for evidence, fit in (plain, ticked)))
-    return before - after > gain_by_chance(drives)
+    spans: dict[str, list[float]] = {}
+    for drive in drives:
+        if drive.clock is not None:
+            spans.setdefault(drive.recording, []).extend((drive.start, drive.end))
+    return before - after > gain_by_chance([max(one) - min(one) for one in spans.values()])
 
 
 def any_lateness(point: Point) -> Point:
@@ -85,31 +89,3 @@ def any_lateness(point: Point) -> Point:
         replace(u, deviation=late, own=late, room=late, lower=u.prompt - late,
                 upper=u.prompt + late) if u.name == 'command_delay' else u
         for u in point.unknowns))
-
-
-def gain_by_chance(drives: Sequence[Drive]) -> float:
-    """
-    Return what ticks gain on a base without any, once in as many as false alarms are allowed.
-
-    Rates 1/T apart, in a recording that lasts T, and phases a deviation d of the phase apart are
-    trials of their own. For rates from f1 to f2, ticks of none of them gain more than::
-
-        log(T (f2 - f1)) - log(d), summed over the recordings, - log(rate of false alarms)
-
-    Parameters
-    ----------
-    drives : sequence of Drive
-        With the ticks that are likeliest.
-
-    Returns
-    -------
-    float
-        [nats].
-    """
-    band = 1.0 / setting('clock_shortest') - 1.0 / setting('clock_longest')
-    ticking = [d for d in drives if d.clock is not None]
-    names = {d.recording for d in ticking}
-    longest = max(max(d.end for d in ticking if d.recording == name)
-                  - min(d.start for d in ticking if d.recording == name) for name in names)
-    return (math.log(max(longest * band, 1.0)) - len(names) * math.log(setting('clock_phase'))
-            - math.log(setting('false_alarm_rate')))

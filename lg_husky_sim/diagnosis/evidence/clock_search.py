@@ -1,0 +1,291 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Bases that apply commands at their own ticks, not when they come.
+
+The command with the stamp t_i is applied at the next tick, ``(phase - t_i) mod period`` later, and
+of several between two ticks the last one counts. The first harmonic of these delays, ``period / pi
+* sin(2 pi (t_i - phase) / period)``, stands out of their spectrum over the stamps at the base's
+rate, and at those that are the same to commands with a rate of their own. A base has one rate in
+all recordings, one phase in each. The linear problem of the delays
+(:mod:`~lg_husky_sim.diagnosis.evidence.command_steps`) finds rates and phases to begin with;
+which of them they are, simulations say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+import functools
+import math
+import operator
+from typing import Final
+
+from lg_husky_sim.diagnosis.evidence import student
+from lg_husky_sim.diagnosis.evidence.command_steps import Rates, scaled, Steps
+from lg_husky_sim.diagnosis.evidence.drives import Clock
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.signals import FloatArray, TimeSeries
+from lg_husky_sim.threads import Threads
+import numpy as np
+from scipy.fft import next_fast_len
+
+#: How much nearer clocks are tried in each turn; as near as the one before tried them.
+_FINER: Final = (1.0, 3.0, 9.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Ticker:
+    """
+    Looks for the clock of a base in one drive by simulation.
+
+    Parameters
+    ----------
+    recording : str
+    commands : TimeSeries
+        As they come.
+    read : callable
+        Returns the residuals of the rates, each with its times [s], with some commands that act
+        so much later [s].
+    steps : Steps
+    delay : float
+        From a command to its effect, where all are applied as they come [s].
+    """
+
+    recording: str
+    commands: TimeSeries
+    read: Callable[[TimeSeries, float], Rates]
+    steps: Steps
+    delay: float
+
+    @functools.cached_property
+    def plain(self) -> float:
+        """The cost without a clock."""
+        return self._cost(self.commands, 0.0)
+
+    def cost(self, clock: Clock) -> float:
+        """Return the negative log likelihood of rates with a clock, to a constant."""
+        return self._cost(at_ticks(self.commands, clock.period, clock.phase), clock.late)
+
+    def _cost(self, commands: TimeSeries, later: float) -> float:
+        return student.cost(scaled(self.read(commands, later), self.steps.scales))
+
+
+def at_ticks(commands: TimeSeries, period: float, phase: float) -> TimeSeries:
+    """
+    Return commands when a base applies them.
+
+    Parameters
+    ----------
+    commands : TimeSeries
+        When they come.
+    period, phase : float
+        Of its ticks [s].
+
+    Returns
+    -------
+    TimeSeries
+        At the next tick each; of several between two ticks the last one.
+    """
+    number = np.ceil((commands.times - phase) / period)
+    last = np.append(np.diff(number) > 0.5, True)
+    return TimeSeries(phase + period * number[last], commands.values[last], commands.names)
+
+
+def _promising(steps: Sequence[Steps]) -> list[float]:
+    # Rates at which the spectra of delays and slopes stand out, strongest first, each with those
+    # that are the same where commands change at a rate of their own [Hz].
+    longest = max(float(np.ptp(one.stamps)) for one in steps)
+    # Of stamps on a grid that is fine for the shortest period; lines as near as drives tell apart.
+    grid = setting('clock_shortest') / setting('clock_grid')
+    count = next_fast_len(int(np.ceil(5.0 * longest / grid)), real=True)
+    first = int(np.ceil(grid * count / setting('clock_longest')))
+    last = int(grid * count / setting('clock_shortest'))
+    rates = np.arange(first, last) / (grid * count)
+    found: list[list[float]] = []
+    for seen in ([one.weights * (one.delays - one.late) for one in steps],
+                 [one.slope - np.mean(one.slope) for one in steps]):
+        power = np.zeros(rates.size)
+        for one, values in zip(steps, seen, strict=True):
+            at = np.rint((one.stamps - one.stamps[0]) / grid).astype(np.intp)
+            lines = np.fft.rfft(np.bincount(at, values), count)[first:last]
+            power += np.abs(lines) ** 2 / max(float(np.sum(values ** 2)), 1e-300)
+        peak = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
+        found.append(rates[peak[np.argsort(-power[peak], kind='stable')][
+            :int(setting('clock_peaks'))]].tolist())
+    own = 1.0 / float(np.median(np.concatenate([np.diff(one.stamps) for one in steps])))
+    strongest = [both for pair in zip(*found, strict=False) for both in pair]
+    if own < rates[0]:
+        return strongest
+    most = 1 + int(rates[-1] / own)
+    alike = [abs(rate + own * turn) for rate in strongest[:int(setting('clock_rivals'))]
+             for turn in range(-most, most + 1)]
+    return [*strongest, *(rate for rate in alike if rates[0] <= rate <= rates[-1])]
+
+
+def _same_rate(known: Mapping[str, Sequence[Ticker]], periods: FloatArray,
+               count: int) -> dict[str, Clock]:
+    # The likeliest clock of each recording by the linear problem: one rate and one lateness of
+    # all, as one base has, one phase of each.
+    origins = {name: float(own[0].steps.stamps[0]) for name, own in known.items()}
+    fitted = {name: functools.reduce(operator.add, [
+        one.steps.clock_costs(periods, origins[name], count) for one in own])
+        for name, own in known.items()}
+    whole = sum(one.stiffness for one in fitted.values())
+    each, found = np.arange(periods.size), []
+    for first in fitted.values():
+        late = first.late[each, np.argmin(first.cost, axis=1)]
+        for _ in range(int(setting('clock_turns'))):
+            chosen = {name: one.phases(late)[0] for name, one in fitted.items()}
+            late = sum((one.stiffness * one.late[each, chosen[name]]
+                        for name, one in fitted.items()), np.zeros(periods.size)) / whole
+        cost = sum((one.phases(late)[1] for one in fitted.values()), np.zeros(periods.size))
+        place = int(np.argmin(cost))
+        found.append((float(cost[place]), float(periods[place]), float(late[place]),
+                      {name: int(one.phases(late)[0][place]) for name, one in fitted.items()}))
+    _, period, late_by, phases = min(found, key=lambda one: one[0])
+    return {name: Clock(period, origins[name] + period * phase / count, late_by)
+            for name, phase in phases.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class ClockSearch:
+    """
+    Looks for the clock of a base: one rate in all recordings, one phase in each.
+
+    Parameters
+    ----------
+    tickers : sequence of Ticker
+        One a drive.
+    pool : Threads
+    """
+
+    tickers: Sequence[Ticker]
+    pool: Threads
+
+    @functools.cached_property
+    def recordings(self) -> dict[str, list[Ticker]]:
+        """The drives of each."""
+        found: dict[str, list[Ticker]] = {}
+        for ticker in self.tickers:
+            found.setdefault(ticker.recording, []).append(ticker)
+        return found
+
+    @functools.cached_property
+    def longest(self) -> float:
+        """How long commands go on in the longest recording [s]."""
+        return float(max(own[-1].steps.stamps[-1] - own[0].steps.stamps[0]
+                         for own in self.recordings.values()))
+
+    def gain(self, clocks: Mapping[str, Clock]) -> float:
+        """Return what rates gain by clocks, in nats."""
+        return sum(one.plain - one.cost(clocks[one.recording]) for one in self.tickers)
+
+    def _apart(self, rates: Sequence[float]) -> list[float]:
+        # Without those that the longest recording cannot tell from one before.
+        found: list[float] = []
+        for rate in rates:
+            if all(abs(rate - one) * self.longest > 0.5 for one in found):
+                found.append(rate)
+        return found
+
+    def likeliest(self) -> list[dict[str, Clock]]:
+        """Return the likeliest clocks by recordings at each rate that stands out, best first."""
+        in_step = self._in_step()
+        rates = self._apart([*in_step, *_promising([one.steps for one in self.tickers])])
+        found = _best([*self.pool.map(self._tried, rates),
+                       *self.pool.map(self._prompt, in_step)], 'clock_rates')
+        for finer in _FINER:
+            found = _best((self._sharpened(clocks, finer) for _, clocks in found),
+                          'clock_rivals')
+        return [clocks for gain, clocks in found if gain > 0.0]
+
+    def sharp(self, clocks: Mapping[str, Clock]) -> Mapping[str, Clock]:
+        """Return the likeliest clocks near some."""
+        for finer in _FINER:
+            _, clocks = self._sharpened(clocks, finer)
+        return clocks
+
+    def _in_step(self) -> list[float]:
+        # Multiples of the rate at which commands come: their delays are all alike, or jump by a
+        # whole period, and no spectrum shows it.
+        spans = [(one.commands.times, np.diff(one.commands.times))
+                 for one in self.tickers if one.commands.times.size > 1]
+        usual = float(np.median(np.concatenate([gaps for _, gaps in spans])))
+        own = (sum(float(np.sum(np.rint(gaps / usual))) for _, gaps in spans)
+               / sum(float(times[-1] - times[0]) for times, _ in spans))
+        fastest, slowest = 1.0 / setting('clock_shortest'), 1.0 / setting('clock_longest')
+        return [own * k for k in range(1, int(fastest / own) + 1) if own * k >= slowest]
+
+    def _prompt(self, rate: float) -> tuple[float, dict[str, Clock]]:
+        # The likeliest phase of each recording, by simulation, of ticks that alone make late: even
+        # ones, and those between which commands come, where a little jitter makes some late.
+        found, count, period = {}, int(setting('clock_phases')), 1.0 / rate
+        parts = (np.arange(count) + 0.5) / count
+        for name, own in self.recordings.items():
+            late = -own[0].delay
+            came = np.mod(np.concatenate([one.commands.times for one in own]), period)
+            clocks = [Clock(period, float(phase), late)
+                      for phase in (*(period * parts), *np.quantile(came, parts))]
+            found[name] = min(clocks, key=lambda clock, own=own: sum(  # type: ignore[misc]
+                one.cost(clock) for one in own))
+        return self.gain(found), found
+
+    def _tried(self, rate: float) -> tuple[float, dict[str, Clock]]:
+        drift = setting('clock_drift') * np.linspace(-1.0, 1.0, 5) / self.longest
+        clocks = _same_rate(self.recordings, (1.0 + drift / rate) / rate,
+                            int(setting('clock_phases')))
+        return self.gain(clocks), clocks
+
+    def _sharpened(self, clocks: Mapping[str, Clock], finer: float
+                   ) -> tuple[float, dict[str, Clock]]:
+        # The likeliest clocks near some, by simulation, and what rates gain by them.
+        drift, part = setting('clock_drift') / finer, setting('clock_shift') / finer
+        steps = np.linspace(-1.0, 1.0, int(setting('clock_parts')))
+        tried = {name: [[_moved(clocks[name], own, drift * turn / self.longest, part * later)
+                         for later in steps] for turn in steps]
+                 for name, own in self.recordings.items()}
+        gains = {name: np.array([list(self.pool.map(
+            lambda clock, own=own: sum(one.plain - one.cost(clock) for one in own), held))
+            for held in tried[name]]) for name, own in self.recordings.items()}
+        rate = int(np.argmax(sum(np.max(own, axis=1) for own in gains.values())))
+        return float(sum(np.max(own[rate]) for own in gains.values())), {
+            name: tried[name][rate][int(np.argmax(own[rate]))] for name, own in gains.items()}
+
+
+def _best(tried: Iterable[tuple[float, dict[str, Clock]]],
+          name: str) -> list[tuple[float, dict[str, Clock]]]:
+    # As many as a setting says that gain most.
+    return sorted(tried, key=lambda one: -one[0])[:int(setting(name))]
+
+
+def _moved(clock: Clock, drives: Sequence[Ticker], drift: float, part: float) -> Clock:
+    # A clock that drifts by parts of a period in a second, and ticks a part later in the middle.
+    middle = 0.5 * (drives[0].steps.stamps[0] + drives[-1].steps.stamps[-1])
+    tick = clock.phase + clock.period * round((middle - clock.phase) / clock.period)
+    return Clock(clock.period * (1.0 + drift * clock.period), tick + part * clock.period,
+                 clock.late)
+
+
+def gain_by_chance(lengths: Sequence[float]) -> float:
+    """
+    Return what ticks gain on a base without any, once in as many as false alarms are allowed.
+
+    Rates 1/T apart, in a recording that lasts T, and phases a deviation d of the phase apart are
+    trials of their own. For rates from f1 to f2, ticks of none of them gain more than::
+
+        log(T (f2 - f1)) - log(d), summed over the recordings, - log(rate of false alarms)
+
+    Parameters
+    ----------
+    lengths : sequence of float
+        Of each recording with ticks, from its start to its end [s].
+
+    Returns
+    -------
+    float
+        [nats].
+    """
+    band = 1.0 / setting('clock_shortest') - 1.0 / setting('clock_longest')
+    return (math.log(max(max(lengths) * band, 1.0)) - len(lengths) * math.log(
+        setting('clock_phase')) - math.log(setting('false_alarm_rate')))
