@@ -97,7 +97,8 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     same recordings parted in any other way into two sets of these sizes, once what is claimed to
     have changed is taken out of the later ones (permutation of the residuals, ter Braak 1992), and
     against what unchanged robots gain; and so is what all but any one of the recordings gain
-    (jackknife). The larger chance of both counts.
+    (jackknife). The larger chance of both counts. A change that the latter do not make likelier
+    than none, where even odds are spread over all n changes (gain below log n), is chance.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     bounds = fits.base.bounds()
     return Block(
         fits.base, np.clip(before, *bounds), np.clip(after, *bounds), fits.noise,
-        tuple(replace(one, chance=max(
+        tuple(replace(one, chance=1.0 if one.told < math.log(len(candidates)) else max(
             comparison.chance(one.parameters, one.gain, [o.gain for o in own[one.change]],
                               best_of_all, len(candidates), numbers),
             comparison.chance(one.parameters, one.told, [o.told for o in own[one.change]],
