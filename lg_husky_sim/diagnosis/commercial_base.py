@@ -106,7 +106,8 @@ def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
     z = options[int(np.argmin(costs))]
     steps, rough = int(setting('base_steps')), known.fit['roughly']
     z = fit_set(base, drives, prior, noise, z, steps, rough, pool.map).z
-    noise = noise_of([residual(base, d, z) for d in drives], int(known.fit['filter']))
+    noise = noise_of([residual(base, d, z) for d in drives],
+                     [d.vigour for d in drives], known, base.given)
     z = fit_set(base, drives, prior, noise, z, steps, rough, pool.map).z
     values = dict(zip(base.names, map(float, base.values(z)), strict=True))
     model = fitted([started(nominal, values, known)], parts, int(known.fit['evaluations']), about)

@@ -69,7 +69,8 @@ def _scatter(base: Base, drives: Sequence[Drive], z: FloatArray, noise: Noise, p
     grams: dict[str, FloatArray] = {}
     for drive in drives:
         rows, columns = jacobian(base, drive, z, prior.free)
-        errors, derivatives = noise.by_channel(rows), noise.by_channel(columns)
+        errors, derivatives = (
+            noise.by_channel(one, drive.vigour) for one in (rows, columns))
         for stream, names in CHANNELS.items():
             for name in names:
                 if name not in errors or not errors[name].size:

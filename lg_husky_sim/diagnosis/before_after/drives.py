@@ -68,6 +68,10 @@ class Drive:
         By stream: wheels, imu, pose.
     gyro : numpy.ndarray, shape (n, 2)
         Stamps [s] and the integral of the yaw rate to each [rad]; none without an IMU.
+    vigour : mapping of str to numpy.ndarray, shape (n_rows, 2)
+        By stream, in each bin or from one to the next (pose): squares of the yaw rate [(rad/s)^2]
+        and of the acceleration of the wheels [(rad/s^2)^2], as measured about that time; NaN while
+        nothing has been asked for.
     """
 
     recording: str
@@ -79,6 +83,7 @@ class Drive:
     begin: FloatArray
     bins: Mapping[str, Bins]
     gyro: FloatArray
+    vigour: Mapping[str, FloatArray]
 
     def largest_command(self, column: int) -> float:
         """Return the largest command forward or in yaw (0 or 1), of either sign [m/s, rad/s]."""
@@ -163,7 +168,41 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
         binned('pose', np.column_stack([pose.values[:, :2], heading]), 'place')
         at = np.interp(middle, pose.times, heading)
         level = np.column_stack([np.cos(at), np.sin(at)])
-    return Drive(name, start, steps, command, level, wheels, begin, bins, gyro)
+    return Drive(name, start, steps, command, level, wheels, begin, bins, gyro,
+                 _vigour(bins, max(widths.values()), command, settle))
+
+
+def _vigour(bins: Mapping[str, Bins], reach: float, command: TimeSeries, settle: float
+            ) -> dict[str, FloatArray]:
+    # By the gyro or else the pose or the wheels; by the wheels or else by how the yaw rate changes.
+    centres = {name: one.centres() for name, one in bins.items()}
+    if 'imu' in bins:
+        stamps, turning = centres['imu'], bins['imu'].values[:, 0]
+    elif 'pose' in bins:
+        stamps = centres['pose']
+        turning = np.gradient(bins['pose'].values[:, 2], stamps)
+    else:
+        stamps, turning = centres['wheels'], np.diff(bins['wheels'].values, axis=1)[:, 0]
+    hurry = stamps, np.gradient(turning, stamps)
+    if 'wheels' in bins:
+        hurry = centres['wheels'], np.max(np.abs(np.gradient(
+            bins['wheels'].values, centres['wheels'], axis=0)), axis=1)
+
+    def about(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
+        # Mean square over the widest bin to either side.
+        total = np.concatenate([[0.0], np.cumsum(values ** 2)])
+        first = np.minimum(np.searchsorted(times, at - reach), times.size - 1)
+        last = np.maximum(np.searchsorted(times, at + reach), first + 1)
+        return np.asarray((total[last] - total[first]) / (last - first))
+    found = {}
+    for name, at in centres.items():
+        rows = 0.5 * (at[1:] + at[:-1]) if name == 'pose' else at
+        found[name] = np.column_stack([about(rows, stamps, turning), about(rows, *hurry)])
+        asked = np.concatenate([[0], np.cumsum(np.any(command.values != 0.0, axis=1))])
+        first, last = (np.searchsorted(command.times, rows - ago, side='right')
+                       for ago in (settle, 0.0))
+        found[name][asked[last] == asked[np.maximum(first - 1, 0)]] = np.nan
+    return found
 
 
 def all_drives(recordings: Sequence[Recording], step: float, widths: Mapping[str, float],

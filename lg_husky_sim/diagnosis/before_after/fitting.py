@@ -72,7 +72,7 @@ class SetFit:
 def whites(base: Base, drives: Sequence[Drive], noise: Noise, z: FloatArray,
            each: Mapper) -> list[FloatArray]:
     """Return the whitened residuals of each drive."""
-    return list(each(lambda drive: noise.white(residual(base, drive, z)), drives))
+    return list(each(lambda drive: noise.white(residual(base, drive, z), drive.vigour), drives))
 
 
 def _cost(errors: Sequence[FloatArray], prior: Prior, z: FloatArray) -> float:
@@ -87,7 +87,7 @@ def costs_at(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise,
 
     It is infinite where the simulation breaks down.
     """
-    rows = list(each(lambda drive: [noise.white(one) for one in residuals(base, drive, places)],
+    rows = list(each(lambda drive: [noise.white(one, drive.vigour) for one in residuals(base, drive, places)],
                      drives))
     return [_cost([of_drive[k] for of_drive in rows], prior, z) for k, z in enumerate(places)]
 
@@ -126,7 +126,8 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
     for _ in range(steps):
         def one(drive: Drive, at: FloatArray = z) -> tuple[FloatArray, FloatArray]:
             rows, columns = jacobian(base, drive, at, free)
-            return noise.white(rows), noise.white(columns)[:, free]
+            return (noise.white(rows, drive.vigour),
+                    noise.white(columns, drive.vigour)[:, free])
         pairs = list(each(one, drives))
         errors, derivatives = [e for e, _ in pairs], [j for _, j in pairs]
         cost = _cost(errors, prior, z)

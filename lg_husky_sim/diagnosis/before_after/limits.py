@@ -53,7 +53,7 @@ def with_limits(base: Base, drives: Sequence[Drive], noise: Noise, prior: Prior,
 
     def cost(at: FloatArray) -> float:
         return 0.5 * sum(float(e @ e) for e in (
-            noise.white(residual(base, d, at)) for d in drives))
+            noise.white(residual(base, d, at), d.vigour) for d in drives))
     here, upper = near.value(z), base.bounds()[1]
     for k, quantity in enumerate(quantities):
         if not prior.free[k] or quantity.name not in base.settings.limits:

@@ -80,7 +80,7 @@ class RecordingFits:
         RecordingFits
         """
         base, numbers = self.base, self.base.settings.fit
-        groups = _by_recording(self.drives)
+        groups = by_recording(self.drives)
         held = np.array([q.name in base.settings.runs_as for q in base.settings.quantities])
 
         def end(name: str) -> FloatArray:
@@ -137,7 +137,7 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
     wide = np.array([np.hypot(q.recording, q.change) for q in quantities])
     # A delay of every stream is one of the commands: that of one stream is none in all recordings.
     wide[base.reference] = base.sd[base.reference]
-    groups = _by_recording(drives)
+    groups = by_recording(drives)
     places, noise, prior = _alone(base, prior, wide, groups, lags, begin, pool, share)
     every = replace(every, mean=prior.mean)
     about = _deviations(base, prior, wide, {
@@ -257,13 +257,14 @@ def quadratic(base: Base, drive: Drive, noise: Noise, z: FloatArray, prior: Prio
         |e + J (x - z)|^2 / 2 = x' J'J x / 2 - (J'J z - J'e)' x + |e - J z|^2 / 2
     """
     rows, columns = jacobian(base, drive, z, prior.free)
-    e, j = noise.white(rows), noise.white(columns)
+    e, j = noise.white(rows, drive.vigour), noise.white(columns, drive.vigour)
     curvature, slope = j.T @ j, j.T @ e
     return Quadratic(drive.recording, False, z, curvature, curvature @ z - slope,
                      0.5 * float(e @ e) - float(z @ slope) + 0.5 * float(z @ curvature @ z))
 
 
-def _by_recording(drives: Sequence[Drive]) -> dict[str, list[Drive]]:
+def by_recording(drives: Sequence[Drive]) -> dict[str, list[Drive]]:
+    """Return the drives of each recording."""
     groups: dict[str, list[Drive]] = {}
     for drive in drives:
         groups.setdefault(drive.recording, []).append(drive)
@@ -309,8 +310,9 @@ def _shifted(base: Base, free: NDArray[np.bool_], begin: FloatArray) -> list[Flo
 def _renewed(base: Base, groups: Mapping[str, Sequence[Drive]], places: Places, prior: Prior,
              of: Noise, pool: Executor) -> Noise:
     # That of the residuals where each recording was fitted, in the channels of another one.
-    noise = noise_of([residual(base, d, places[name]) for name, ds in groups.items() for d in ds],
-                     int(base.settings.fit['filter'])).among(of.sd)
+    drives = [d for ds in groups.values() for d in ds]
+    noise = noise_of([residual(base, d, places[d.recording]) for d in drives],
+                     [d.vigour for d in drives], base.settings, base.given).among(of.sd)
     return dispersed(base, groups, places, noise, prior, pool)
 
 
