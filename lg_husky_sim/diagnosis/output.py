@@ -34,7 +34,7 @@ def headline(diagnosis: Diagnosis, changed: bool = False) -> str:
                     if changed else
                     'No missing physics found: the recalibrated model explains the recordings.')
         case Verdict.UNKNOWN if not diagnosis.fits:
-            return 'This model does not fit this robot.'
+            return f'{diagnosis.misfit}.'
         case Verdict.UNKNOWN:
             return ('Something has changed that is not in the catalogue.' if changed else
                     'Something is missing that is not in the catalogue.')

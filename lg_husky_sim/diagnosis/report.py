@@ -120,8 +120,7 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
                      else 'The recalibrated model explains the recordings.')
             return Headline(text, Tone.GOOD, (sure,), (words,), tuple(warnings))
         case Verdict.UNKNOWN if not diagnosis.fits:
-            return Headline('This model does not fit this robot', Tone.BAD, (sure,),
-                            sentences, tuple(warnings))
+            return Headline(diagnosis.misfit, Tone.BAD, (sure,), sentences, tuple(warnings))
         case Verdict.UNKNOWN:
             parts = ', '.join(dict.fromkeys(one.subsystem for one in found))
             text = 'Something has changed' if changed else 'Something is missing'

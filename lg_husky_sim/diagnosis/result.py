@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.effects import Onset, OnsetKind
+from lg_husky_sim.husky.effects import Onset, OnsetKind, Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.reporting.words import quantity_with_unit
 
@@ -184,6 +184,13 @@ class Diagnosis:
     features: Mapping[str, float] = field(default_factory=dict)
     sensors: tuple[str, ...] = ()
     fits: bool = True
+
+    @property
+    def misfit(self) -> str:
+        """What does not fit where the model is not one of this robot, a stream or all of it."""
+        stream = bool(self.findings) and self.findings[0].subsystem == Subsystem.SENSOR.value
+        return ('A stream of these recordings cannot be right' if stream
+                else 'This model does not fit this robot')
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -323,3 +323,11 @@ def test_another_robot_is_refused_and_its_reversed_gyro_found_all_the_same(
     assert 'commercial base' in diagnosis.model.about or diagnosis.model == diagnosis.plain_model
     assert [f.effect for f in diagnosis.findings] == ['unknown', 'gyro_sign']
     assert any('wrong sign' in text for text in diagnosis.sensors)
+
+
+def test_rates_in_degrees_are_a_stream_that_cannot_be_right(clean: Recording) -> None:
+    """And not another robot."""
+    wrong = changed(clean, imu=None, wheels=scaled(clean.stream('wheels'), np.degrees(1.0)))
+    diagnosis = diagnose([wrong], load_model(), silent).diagnosis
+    assert headline(diagnosis) == 'A stream of these recordings cannot be right.'
+    assert 'degrees' in diagnosis.findings[0].statement
