@@ -174,7 +174,7 @@ def _drive(name: str, start: float, end: float, streams: Mapping[str, TimeSeries
 
 def _vigour(bins: Mapping[str, Bins], reach: float, command: TimeSeries, settle: float
             ) -> dict[str, FloatArray]:
-    # By the gyro or else the pose or the wheels; by the wheels or else by how the yaw rate changes.
+    # By gyro or else the pose or the wheels; by wheels or else by changes of the yaw rate.
     centres = {name: one.centres() for name, one in bins.items()}
     if 'imu' in bins:
         stamps, turning = centres['imu'], bins['imu'].values[:, 0]

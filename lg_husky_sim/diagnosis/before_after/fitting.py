@@ -87,8 +87,8 @@ def costs_at(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise,
 
     It is infinite where the simulation breaks down.
     """
-    rows = list(each(lambda drive: [noise.white(one, drive.vigour) for one in residuals(base, drive, places)],
-                     drives))
+    rows = list(each(lambda drive: [noise.white(one, drive.vigour) for one in residuals(
+        base, drive, places)], drives))
     return [_cost([of_drive[k] for of_drive in rows], prior, z) for k, z in enumerate(places)]
 
 

@@ -18,8 +18,8 @@ class Noise:
     """
     Whitening filters by channel, with variances that grow with the motion.
 
-    What tyres do beyond the base is small while a robot drives straight ahead at an even speed, and
-    large where it turns or changes its speed. With the squares q of the yaw rate and of the
+    What tyres do beyond the base is small while a robot drives straight ahead at an even speed,
+    and large where it turns or changes its speed. With the squares q of the yaw rate and of the
     acceleration of the wheels, what a filter leaves has the variance::
 
         sd^2 (1 + growth . q)
@@ -86,7 +86,8 @@ def first_noise(settings: Settings) -> Noise:
 
 
 def noise_of(residuals: Sequence[Mapping[str, FloatArray]],
-             vigours: Sequence[Mapping[str, FloatArray]], settings: Settings, grows: bool) -> Noise:
+             vigours: Sequence[Mapping[str, FloatArray]], settings: Settings, grows: bool
+             ) -> Noise:
     """
     Estimate filters and variances from residuals of a good fit.
 
@@ -154,7 +155,7 @@ def _shares(squares: FloatArray, parts: FloatArray, turns: int) -> FloatArray:
 
 def surprise(noise: Noise, residuals: Sequence[Mapping[str, FloatArray]],
              vigours: Sequence[Mapping[str, FloatArray]]) -> float:
-    """Return the negative log likelihood of residuals whose noise this is [nats, to a constant]."""
+    """Return the negative log likelihood of residuals of this noise, to a constant [nats]."""
     total = 0.0
     for rows, vigour in zip(residuals, vigours, strict=True):
         for name, white in noise.by_channel(rows, vigour).items():

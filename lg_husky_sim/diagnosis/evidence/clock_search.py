@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import functools
 import math
 import operator
-from typing import Final
 
 from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.command_steps import Rates, scaled, Steps
@@ -29,9 +28,6 @@ from lg_husky_sim.signals import FloatArray, TimeSeries
 from lg_husky_sim.threads import Threads
 import numpy as np
 from scipy.fft import next_fast_len
-
-#: How much nearer clocks are tried in each turn; as near as the one before tried them.
-_FINER: Final = (1.0, 3.0, 9.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,14 +191,14 @@ class ClockSearch:
         rates = self._apart([*in_step, *_promising([one.steps for one in self.tickers])])
         found = _best([*self.pool.map(self._tried, rates),
                        *self.pool.map(self._prompt, in_step)], 'clock_rates')
-        for finer in _FINER:
+        for finer in _finer():
             found = _best((self._sharpened(clocks, finer) for _, clocks in found),
                           'clock_rivals')
         return [clocks for gain, clocks in found if gain > 0.0]
 
     def sharp(self, clocks: Mapping[str, Clock]) -> Mapping[str, Clock]:
         """Return the likeliest clocks near some."""
-        for finer in _FINER:
+        for finer in _finer():
             _, clocks = self._sharpened(clocks, finer)
         return clocks
 
@@ -251,6 +247,11 @@ class ClockSearch:
         rate = int(np.argmax(sum(np.max(own, axis=1) for own in gains.values())))
         return float(sum(np.max(own[rate]) for own in gains.values())), {
             name: tried[name][rate][int(np.argmax(own[rate]))] for name, own in gains.items()}
+
+
+def _finer() -> FloatArray:
+    # How much nearer clocks are tried in each turn; as near as the one before tried them.
+    return np.asarray(setting('clock_finer') ** np.arange(setting('clock_sharper')))
 
 
 def _best(tried: Iterable[tuple[float, dict[str, Clock]]],

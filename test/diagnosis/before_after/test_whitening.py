@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Noise that grows with the motion is estimated as it was drawn, and counts as much as it tells."""
+"""Noise that grows with the motion is estimated as it was drawn."""
 
 from __future__ import annotations
 
