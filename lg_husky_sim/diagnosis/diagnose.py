@@ -32,6 +32,7 @@ from lg_husky_sim.diagnosis.nameless import described, left_over, remaining, unk
 from lg_husky_sim.diagnosis.result import Diagnosis, grown, Rivalry, Verdict
 from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
+from lg_husky_sim.diagnosis.selection.supply import likeliest_supply
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
 from lg_husky_sim.diagnosis.sensors.relations import relations
 from lg_husky_sim.diagnosis.sensors.repair import (
@@ -44,7 +45,7 @@ from lg_husky_sim.diagnosis.sensors.robot import differences, impossible, misrea
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
-from lg_husky_sim.husky.parameters import Parameter
+from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.recording import check_driven, named_apart, Recording, Segment, segments
 from lg_husky_sim.threads import threads
 
@@ -113,6 +114,8 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     numbers = nominal.parameters.replacing({k: v for d in different for k, v in d.numbers.items()})
     with threads(jobs) as pool:
         start = beginning(nominal.structure, base_unknowns(numbers, drives), numbers, Reading())
+        numbers = likeliest_supply(drives, names, start, pool)
+        start = beginning(nominal.structure, base_unknowns(numbers, drives), numbers, Reading())
         start, there = begun_with(start, certain(seen))
         progress('noise', 0.02)
         evidence = evidence_of(drives, names, start,
@@ -133,8 +136,16 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
             said = _of_other_robot(said, model_mismatch(
                 different, found, said.held_out_plain, recordings, parts, sized, there, pool))
     sensors = tuple(f.statement for f in seen)
-    return Case(replace(said, notes=(*said.notes, *_mended(recordings)), sensors=sensors), found,
+    notes = (*said.notes, *_supplied(nominal, numbers), *_mended(recordings))
+    return Case(replace(said, notes=notes, sensors=sensors), found,
                 parts, nominal, rest, features)
+
+
+def _supplied(nominal: ModelFile, numbers: Parameters) -> tuple[str, ...]:
+    most, known = numbers['supply_voltage'], nominal.parameters['supply_voltage']
+    return () if most == known else (
+        f'the motors seem to get up to {most:.3g} V, where the model has a supply of {known:g} V: '
+        'supply_voltage is that, and command_gain less by as much',)
 
 
 def _of_other_robot(said: Diagnosis, other: ModelMismatch) -> Diagnosis:
