@@ -13,7 +13,7 @@ from lg_husky_sim.diagnosis.before_after.conclusion import findings, mismatches,
 from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.drives import all_drives, Drive
 from lg_husky_sim.diagnosis.before_after.lags import lags_of
-from lg_husky_sim.diagnosis.before_after.received import as_received
+from lg_husky_sim.diagnosis.before_after.received import as_received, likelier
 from lg_husky_sim.diagnosis.before_after.recording_fits import (
     at_the_edge,
     fit_recordings,
@@ -119,9 +119,9 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
             lambda share: progress('wheel loop and body', 0.3 + 0.25 * share))
         got = as_received(looped, pool)
         if got is not None:
-            looped = fit_recordings(
+            looped = likelier(looped, fit_recordings(
                 free, got, lags, looped.common, pool,
-                lambda share: progress('commands as received', 0.55 + 0.2 * share))
+                lambda share: progress('commands as received', 0.55 + 0.2 * share)))
 
         def block(fits: RecordingFits, adopted: Sequence[Change], fitted: Sequence[Change]
                   ) -> Block:

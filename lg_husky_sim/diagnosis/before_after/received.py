@@ -70,6 +70,11 @@ def as_received(fits: RecordingFits, pool: Threads) -> tuple[Drive, ...] | None:
         found, fits.drives, strict=True)) else found
 
 
+def likelier(one: RecordingFits, other: RecordingFits) -> RecordingFits:
+    """Return those fits that leave less, each under the noise of what it leaves."""
+    return min((one, other), key=lambda fits: _judged(fits)[1])
+
+
 @dataclass(frozen=True, eq=False)
 class _Fitted:
     # The recordings fitted with commands at some ticks, and their negative log likelihood [nats].
@@ -129,10 +134,16 @@ def _fitted(fits: RecordingFits, begin: Mapping[str, FloatArray], clocks: Mappin
                        int(numbers['steps']), numbers['roughly'], map).z
     places = dict(zip(groups, pool.map(refitted, groups), strict=True))
     drives = tuple(drive for own in groups.values() for drive in own)
-    left = [residual(base, drive, places[drive.recording]) for drive in drives]
-    vigours = [drive.vigour for drive in drives]
-    noise = noise_of(left, vigours, base.settings, base.given).among(fits.noise.sd)
-    return _Fitted(drives, clocks, places, noise, surprise(noise, left, vigours))
+    return _Fitted(drives, clocks, places, *_judged(
+        replace(fits, drives=drives, places=places)))
+
+
+def _judged(fits: RecordingFits) -> tuple[Noise, float]:
+    # The noise of what fits leave, and the negative log likelihood under it [nats].
+    left = [residual(fits.base, drive, fits.places[drive.recording]) for drive in fits.drives]
+    vigours = [drive.vigour for drive in fits.drives]
+    noise = noise_of(left, vigours, fits.base.settings, fits.base.given).among(fits.noise.sd)
+    return noise, surprise(noise, left, vigours)
 
 
 def _ticked(drive: Drive, clocks: Mapping[str, Clock]) -> Drive:

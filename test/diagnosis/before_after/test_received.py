@@ -12,7 +12,7 @@ from lg_husky_sim.diagnosis.before_after.drives import Drive, drives
 from lg_husky_sim.diagnosis.before_after.fitting import Prior
 from lg_husky_sim.diagnosis.before_after.motion import moved
 from lg_husky_sim.diagnosis.before_after.prediction import predicted
-from lg_husky_sim.diagnosis.before_after.received import as_received
+from lg_husky_sim.diagnosis.before_after.received import as_received, likelier
 from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
@@ -101,3 +101,14 @@ def test_a_command_that_a_base_missed_is_taken_out(pool: Threads) -> None:
     found = as_received(fitted(driven(one, got)), pool)
     assert found is not None
     np.testing.assert_array_equal(found[0].command.times, got.times)
+
+
+def test_of_two_fits_the_one_counts_that_leaves_less() -> None:
+    """Fits with other commands may end on a worse optimum."""
+    one = sent(5)
+    there = fitted(driven(one, one.command))
+    elsewhere = np.array(there.common)
+    elsewhere[there.base.names.index('viscous_left')] += 0.5
+    off = replace(there, places={one.recording: elsewhere})
+    assert likelier(there, off) is there
+    assert likelier(off, there) is there
