@@ -69,6 +69,17 @@ def test_robots_that_have_not_changed_are_flagged_at_the_stated_rate() -> None:
     assert flagged <= 1  # of 12 at 2 %; two or more have a chance of 2 %
 
 
+def test_a_change_that_is_no_likelier_than_none_is_chance() -> None:
+    """Without any one recording, and with even odds spread over all changes."""
+    seen = 0
+    for shift in (0.001, 0.0015, 0.002, 0.0025):
+        candidates = said(recorded(1, 1.0, shift)).candidates
+        small = [one for one in candidates if 0.0 < one.told < np.log(len(candidates))]
+        assert {one.chance for one in small} <= {1.0}
+        seen += len(small)
+    assert seen > 4
+
+
 def test_a_change_among_deviations_is_named() -> None:
     best = said(recorded(1, 3.0, 0.03)).candidates[0]
     assert (best.change.effect, best.change.side) == ('wheel_radius_mismatch', 'left')
