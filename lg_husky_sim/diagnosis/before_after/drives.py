@@ -176,17 +176,22 @@ def _vigour(bins: Mapping[str, Bins], reach: float, command: TimeSeries, settle:
             ) -> dict[str, FloatArray]:
     # By gyro or else the pose or the wheels; by wheels or else by changes of the yaw rate.
     centres = {name: one.centres() for name, one in bins.items()}
+
+    def changing(name: str, values: FloatArray) -> FloatArray:
+        # A single bin does not change.
+        return np.asarray(np.gradient(values, centres[name], axis=0)) if (
+            values.shape[0] > 1) else np.zeros(values.shape)
     if 'imu' in bins:
-        stamps, turning = centres['imu'], bins['imu'].values[:, 0]
+        source, turning = 'imu', bins['imu'].values[:, 0]
     elif 'pose' in bins:
-        stamps = centres['pose']
-        turning = np.gradient(bins['pose'].values[:, 2], stamps)
+        source, turning = 'pose', changing('pose', bins['pose'].values[:, 2])
     else:
-        stamps, turning = centres['wheels'], np.diff(bins['wheels'].values, axis=1)[:, 0]
-    hurry = stamps, np.gradient(turning, stamps)
+        source, turning = 'wheels', np.diff(bins['wheels'].values, axis=1)[:, 0]
+    stamps = centres[source]
+    hurry = stamps, changing(source, turning)
     if 'wheels' in bins:
-        hurry = centres['wheels'], np.max(np.abs(np.gradient(
-            bins['wheels'].values, centres['wheels'], axis=0)), axis=1)
+        hurry = centres['wheels'], np.max(np.abs(changing('wheels', bins['wheels'].values)),
+                                          axis=1)
 
     def about(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
         # Mean square over the widest bin to either side.

@@ -59,7 +59,7 @@ def as_received(fits: RecordingFits, pool: Threads) -> tuple[Drive, ...] | None:
                for own in by_recording(fits.drives).values()]
     if plain.surprise - best.surprise <= gain_by_chance(lengths):
         best = plain
-    elif best is not plain:
+    else:
         # Ticks by what is known of the robot with them.
         clocks = _search(fits, best.places, pool).sharp({
             name: replace(clock, late=0.0) for name, clock in best.clocks.items()})
@@ -157,13 +157,15 @@ def _repaired(base: Base, drive: Drive, z: FloatArray, noise: Noise) -> Drive:
 
     def left(commands: TimeSeries) -> dict[str, FloatArray]:
         return residual(base, replace(drive, command=commands), z)
-    # A few commands that were missed widen a standard deviation, not the scale of most residuals.
-    usual = noise.wider({name: float(np.median(np.abs(own)) / norm.ppf(0.75))
-                         for name, own in noise.by_channel(
-                             left(drive.command), drive.vigour).items()})
+    # A few commands that were missed widen a standard deviation, not the scale of most residuals;
+    # that at rest is no scale.
+    streams = {name: stream for stream, names in CHANNELS.items() for name in names}
+    usual = noise.wider({
+        name: float(np.median(np.abs(moving)) / norm.ppf(0.75))
+        for name, own in noise.by_channel(left(drive.command), drive.vigour).items()
+        if np.any(moving := own[~np.isnan(drive.vigour[streams[name]][-own.size:, 0])])})
     rows = usual.by_channel(left(drive.command), drive.vigour)
-    centres = {name: drive.bins[stream].centres() for stream, names in CHANNELS.items()
-               if stream in drive.bins for name in names}
+    centres = {name: drive.bins[streams[name]].centres() for name in rows}
     got = repaired(
         drive.command, np.concatenate(list(rows.values())),
         np.concatenate([np.full(own.size, name in rates) for name, own in rows.items()]),

@@ -122,9 +122,10 @@ def noise_of(residuals: Sequence[Mapping[str, FloatArray]],
             # A robot at rest is predicted without an error, and says nothing of others.
             asked = ~np.isnan(motion[:, 0])
             past, now, motion = past[asked], now[asked], motion[asked]
-            if not np.any(now):
+            if not np.any(past):
                 continue
-            parts = np.column_stack([np.ones(now.size), motion[:, :2 if grows else 0]])
+            even = np.ones((now.size, 1))
+            parts = np.hstack([even, motion]) if grows else even
             variance = np.ones(now.size)
             for _turn in range(int(settings.fit['variance_turns'])):
                 gram = past.T @ (past / variance[:, None])

@@ -39,11 +39,12 @@ def base() -> Base:
     return base_of(settings(), load_model().parameters, streams=('wheels', 'imu'))
 
 
-def sent(seed: int) -> Drive:
-    """Return a drive of unlike steps, with sensors that have read nothing yet."""
+def sent(seed: int, asks_from: float = 0.0) -> Drive:
+    """Return a drive of unlike steps from a time on, with sensors that have read nothing yet."""
     rng = np.random.default_rng(seed)
     times = np.arange(0.0, 30.0, 0.05) + rng.uniform(0.0, 0.01, 600)
     held = np.repeat(rng.uniform(-0.8, 0.8, (60, 2)), 10, axis=0)
+    held[times < asks_from] = 0.0
 
     def nothing(hertz: float, *names: str) -> TimeSeries:
         at = np.arange(0.0, 30.0, 1.0 / hertz)
@@ -112,3 +113,15 @@ def test_of_two_fits_the_one_counts_that_leaves_less() -> None:
     off = replace(there, places={one.recording: elsewhere})
     assert likelier(there, off) is there
     assert likelier(off, there) is there
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_robot_that_mostly_stands_still_is_judged_by_how_it_drives(pool: Threads) -> None:
+    """Residuals at rest are nought, which is the scale of nothing."""
+    one = sent(6, 24.0)
+    still = driven(one, one.command)
+    quiet = {name: replace(bins, values=np.where(bins.centres()[:, None] < 24.0, 0.0, bins.values))
+             for name, bins in still.bins.items()}
+    asked = {name: np.where(bins.centres()[:, None] < 24.0, np.nan, still.vigour[name])
+             for name, bins in still.bins.items()}
+    assert as_received(fitted(replace(still, bins=quiet, vigour=asked)), pool) is None

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from lg_husky_sim.diagnosis.before_after.drives import drives
+from lg_husky_sim.diagnosis.before_after.drives import _binned, _vigour, drives
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.whitening import noise_of, surprise
 from lg_husky_sim.recording import Recording
@@ -79,3 +79,17 @@ def test_the_motion_is_that_which_was_measured() -> None:
             assert one.vigour[name][inside, column] == pytest.approx(value, rel=0.05)
             assert one.vigour[name][outside, column] == pytest.approx(0.0, abs=1e-9)
             assert np.all(np.isnan(one.vigour[name][:, column]) == (times < 4.0))
+
+
+def test_a_stream_of_a_single_bin_is_no_error() -> None:
+    """It does not change, and another one says how the robot moves."""
+    at = np.arange(0.0, 6.0, 0.05)
+    streams = {
+        'command': TimeSeries(at, np.ones((at.size, 2)), ('forward', 'yaw')),
+        'wheels': TimeSeries(np.array([0.0, 4.0]), np.ones((2, 2)), ('left', 'right')),
+        'pose': TimeSeries(np.array([0.0, 4.0]), np.ones((2, 3)), ('x', 'y', 'heading'))}
+    found = _vigour({name: _binned(one.times[1:], one.values[1:], 0.0, 0.1)
+                     for name, one in streams.items() if name != 'command'}, 0.25,
+                    streams['command'], 1.0)
+    assert found['wheels'].tolist() == [[0.0, 0.0]]
+    assert found['pose'].shape == (0, 2)
