@@ -13,7 +13,6 @@ from lg_husky_sim.diagnosis.before_after.conclusion import findings, mismatches,
 from lg_husky_sim.diagnosis.before_after.decision import Decision
 from lg_husky_sim.diagnosis.before_after.drives import all_drives, Drive
 from lg_husky_sim.diagnosis.before_after.lags import lags_of
-from lg_husky_sim.diagnosis.before_after.received import as_received, likelier
 from lg_husky_sim.diagnosis.before_after.recording_fits import (
     at_the_edge,
     fit_recordings,
@@ -22,6 +21,7 @@ from lg_husky_sim.diagnosis.before_after.recording_fits import (
 from lg_husky_sim.diagnosis.before_after.runnable import carried, fitted, having, started
 from lg_husky_sim.diagnosis.before_after.selection import remembered, select, Selection
 from lg_husky_sim.diagnosis.before_after.settings import Change, Settings, settings
+from lg_husky_sim.diagnosis.before_after.ticks import at_own_ticks, likelier
 from lg_husky_sim.diagnosis.held_out import errors, split
 from lg_husky_sim.diagnosis.result import Diagnosis, Verdict
 from lg_husky_sim.errors import RecordingError
@@ -117,11 +117,11 @@ def change_case(recordings: Sequence[Recording], baseline: Sequence[Recording],
         looped = fit_recordings(
             free, (*before, *after), lags, begin, pool,
             lambda share: progress('wheel loop and body', 0.3 + 0.25 * share))
-        got = as_received(looped, pool)
-        if got is not None:
+        ticking = at_own_ticks(looped, pool)
+        if ticking is not None:
             looped = likelier(looped, fit_recordings(
-                free, got, lags, looped.common, pool,
-                lambda share: progress('commands as received', 0.55 + 0.2 * share)))
+                free, ticking, lags, looped.common, pool,
+                lambda share: progress('commands at ticks', 0.55 + 0.2 * share)))
 
         def block(fits: RecordingFits, adopted: Sequence[Change], fitted: Sequence[Change]
                   ) -> Block:

@@ -1,6 +1,6 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Commands as the base of a comparison got them: at its own ticks, without those it missed."""
+"""The base of a comparison may apply commands at its own ticks."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from lg_husky_sim.diagnosis.before_after.drives import Drive, drives
 from lg_husky_sim.diagnosis.before_after.fitting import Prior
 from lg_husky_sim.diagnosis.before_after.motion import moved
 from lg_husky_sim.diagnosis.before_after.prediction import predicted
-from lg_husky_sim.diagnosis.before_after.received import as_received, likelier
 from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
 from lg_husky_sim.diagnosis.before_after.settings import settings
+from lg_husky_sim.diagnosis.before_after.ticks import at_own_ticks, likelier
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
 from lg_husky_sim.diagnosis.evidence.clock_search import at_ticks
 from lg_husky_sim.husky.model_file import load_model
@@ -39,12 +39,11 @@ def base() -> Base:
     return base_of(settings(), load_model().parameters, streams=('wheels', 'imu'))
 
 
-def sent(seed: int, asks_from: float = 0.0) -> Drive:
-    """Return a drive of unlike steps from a time on, with sensors that have read nothing yet."""
+def sent(seed: int) -> Drive:
+    """Return a drive of unlike steps, with sensors that have read nothing yet."""
     rng = np.random.default_rng(seed)
     times = np.arange(0.0, 30.0, 0.05) + rng.uniform(0.0, 0.01, 600)
     held = np.repeat(rng.uniform(-0.8, 0.8, (60, 2)), 10, axis=0)
-    held[times < asks_from] = 0.0
 
     def nothing(hertz: float, *names: str) -> TimeSeries:
         at = np.arange(0.0, 30.0, 1.0 / hertz)
@@ -81,7 +80,7 @@ def test_ticks_are_found_by_the_wheels_of_both_sets(pool: Threads) -> None:
     one, other = sent(1), sent(2)
     true = [at_ticks(drive.command, PERIOD, phase)
             for drive, phase in ((one, 0.02), (other, 0.05))]
-    found = as_received(fitted(*map(driven, (one, other), true)), pool)
+    found = at_own_ticks(fitted(*map(driven, (one, other), true)), pool)
     assert found is not None
     for drive, ticked in zip(found, true, strict=True):
         near = np.abs(drive.command.times[:, None] - ticked.times).min(axis=1)
@@ -91,17 +90,7 @@ def test_ticks_are_found_by_the_wheels_of_both_sets(pool: Threads) -> None:
 
 def test_a_base_that_takes_commands_as_they_come_gets_these(pool: Threads) -> None:
     one = sent(3)
-    assert as_received(fitted(driven(one, one.command)), pool) is None
-
-
-def test_a_command_that_a_base_missed_is_taken_out(pool: Threads) -> None:
-    """The first of a step, so that the step comes a command later."""
-    one = sent(4)
-    keep = np.arange(one.command.times.size) != 300
-    got = TimeSeries(one.command.times[keep], one.command.values[keep], one.command.names)
-    found = as_received(fitted(driven(one, got)), pool)
-    assert found is not None
-    np.testing.assert_array_equal(found[0].command.times, got.times)
+    assert at_own_ticks(fitted(driven(one, one.command)), pool) is None
 
 
 def test_of_two_fits_the_one_counts_that_leaves_less() -> None:
@@ -113,15 +102,3 @@ def test_of_two_fits_the_one_counts_that_leaves_less() -> None:
     off = replace(there, places={one.recording: elsewhere})
     assert likelier(there, off) is there
     assert likelier(off, there) is there
-
-
-@pytest.mark.filterwarnings('error')
-def test_a_robot_that_mostly_stands_still_is_judged_by_how_it_drives(pool: Threads) -> None:
-    """Residuals at rest are nought, which is the scale of nothing."""
-    one = sent(6, 24.0)
-    still = driven(one, one.command)
-    quiet = {name: replace(bins, values=np.where(bins.centres()[:, None] < 24.0, 0.0, bins.values))
-             for name, bins in still.bins.items()}
-    asked = {name: np.where(bins.centres()[:, None] < 24.0, np.nan, still.vigour[name])
-             for name, bins in still.bins.items()}
-    assert as_received(fitted(replace(still, bins=quiet, vigour=asked)), pool) is None
