@@ -16,8 +16,10 @@ import click
 from click.shell_completion import ShellComplete
 from click.testing import CliRunner
 import lg_husky_sim as lg
+from lg_husky_sim.api.tables import Table
 from lg_husky_sim.cli import main
-from lg_husky_sim.cli.common import BRIEF, Output, rich_table
+from lg_husky_sim.cli.common import BRIEF, Output
+from lg_husky_sim.cli.terminal import print_table
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.husky.effects import catalogue
 from lg_husky_sim.manoeuvres import builtin_manoeuvres
@@ -166,13 +168,37 @@ def test_without_a_terminal_long_work_tells_each_stage_and_short_work_nothing(
     assert capsys.readouterr().err == ''
 
 
-def test_tables_of_the_terminal_hold_the_same_cells() -> None:
+def drawn(table: Table, width: int) -> str:
+    """Return a table as it stands on a terminal."""
     from rich.console import Console
-    console = Console(width=200, file=io.StringIO(), record=True)
-    table = lg.list_manoeuvres()
-    console.print(rich_table(table))
-    drawn = console.export_text()
-    assert all(str(row[0]) in drawn and str(row[4]) in drawn for row in table.rows)
+    console = Console(width=width, file=io.StringIO(), record=True)
+    print_table(table, console)
+    return str(console.export_text())
+
+
+def test_tables_of_the_terminal_hold_the_same_cells_and_units() -> None:
+    for table in (lg.list_manoeuvres(), lg.list_effects('torque_ripple')):
+        text = drawn(table, 200)
+        assert all(str(cell) in text for row in table.rows for cell in row
+                   if isinstance(cell, str))
+        assert all(name in text for name in table.columns), 'rich took [s] for a markup'
+
+
+@pytest.mark.parametrize('width', [30, 60, 80])
+def test_a_narrow_terminal_breaks_no_word_of_a_table(width: int) -> None:
+    for table in (lg.list_manoeuvres(), lg.list_effects(), lg.Husky().table()):
+        said = ' '.join(str(cell) for row in table.rows for cell in row if isinstance(cell, str))
+        assert set(said.split()) <= set(drawn(table, width).split())
+
+
+def test_a_narrow_terminal_breaks_a_topic_at_its_names() -> None:
+    table = Table('Streams', ('stream', 'topic', 'longest gap [s]'), (
+        ('command', '/husky_velocity_controller/cmd_vel', 0.05), ('turn', 'in m/rad', None)))
+    lines = drawn(table, 50).splitlines()
+    assert [line.split()[-1] for line in lines if '/' in line] == [
+        '0.05', '/cmd_vel', '–']
+    assert max(map(len, lines)) <= 50
+    assert '/husky_velocity_controller' in lines[4]
 
 
 def test_a_bag_is_replaced_only_with_overwrite_and_the_message_says_so(

@@ -88,7 +88,8 @@ class Output:
             plain = text.data() if data is None and isinstance(text, Table) else data
             click.echo(json.dumps(plain, indent=1, ensure_ascii=False, allow_nan=False))
         elif isinstance(text, Table) and sys.stdout.isatty():
-            _console().print(rich_table(text))
+            from lg_husky_sim.cli.terminal import print_table
+            print_table(text, _console())
         elif sys.stdout.isatty():
             from rich.text import Text
             _console().print(Text(str(text)), soft_wrap=True)
@@ -110,24 +111,6 @@ class Output:
 def _console() -> Any:
     from rich.console import Console
     return Console(highlight=False)
-
-
-def rich_table(table: Any) -> Any:
-    """Return a table of results as one of rich."""
-    from lg_husky_sim.api.tables import cell, is_number
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-    from rich.text import Text
-
-    made = Table(title=Text(table.title) if table.title else None, box=SIMPLE_HEAD,
-                 title_justify='left', header_style='bold cyan', pad_edge=False)
-    for place, name in enumerate(table.columns):
-        flush = bool(table.rows) and all(is_number(row[place]) for row in table.rows)
-        made.add_column(name, justify='right' if flush else 'left', no_wrap=flush,
-                        style='bold' if place == 0 else '', overflow='fold')
-    for row in table.rows:
-        made.add_row(*(Text(cell(value)) for value in row))
-    return made
 
 
 def spoken(*, page: bool = False, data: bool = True) -> Callable[[Function], Function]:
