@@ -39,7 +39,7 @@ EXTRAS['run'] = [need for extra in ('fast', 'plot', 'bags', 'dds', 'report', 'se
                  for need in EXTRAS[extra]]
 # What the notebooks and `evaluate` need and no more: neither DDS nor an engine.
 EXTRAS['notebook'] = [*(need for extra in ('fast', 'plot', 'bags', 'report', 'search', 'tables')
-                        for need in EXTRAS[extra]), 'jupyterlab>=4']
+                        for need in EXTRAS[extra]), 'ipywidgets>=8', 'jupyterlab>=4']
 EXTRAS['all'] = [*EXTRAS['run'], *EXTRAS['engine'], *EXTRAS['scale'], *EXTRAS['tables']]
 EXTRAS['test'] = ['hypothesis>=6.100', 'ipykernel>=6', 'jsonschema>=4.18', 'nbclient>=0.10',
                   'nbformat>=5.9', 'pytest>=8', 'pytest-rerunfailures>=16.7',

@@ -13,6 +13,7 @@ import sys
 from typing import Any
 
 import lg_husky_sim as lg
+from lg_husky_sim.api import progress
 from lg_husky_sim.api.progress import Lines, shown
 from lg_husky_sim.api.tables import Table
 from lg_husky_sim.errors import CommandError, FitError, ParameterError, RecordingError
@@ -41,8 +42,18 @@ def test_each_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.Monke
     for block in blocks:
         exec(compile(block, 'docs/python.md', 'exec'), names)
     assert names['found'].verdict == 'known'
-    assert [(one.effect, one.side) for one in names['found'].findings] == [
-        ('coulomb_drivetrain', 'left')]
+    found = names['found']
+    assert [(one.effect, one.side) for one in found.findings] == [('coulomb_drivetrain', 'left')]
+    errors = found.errors()
+    assert errors.columns == ('held-out error', 'nominal', 'recalibrated', 'with finding')
+    position = errors.rows[0]
+    assert position[0] == 'position [m]'
+    assert position[1:3] > (0.1, 0.1) > position[3:]
+    html = found._repr_html_()
+    assert '<th>nominal</th>' in html
+    assert html.index('On the robot') < html.index('In the simulator')
+    assert '<code>ros2 run lg_husky_sim sim_node' in html
+    assert repr(found) == str(found)
 
 
 def test_the_example_of_another_robot_runs(tmp_path: Path,
@@ -84,7 +95,8 @@ def test_no_public_name_is_that_of_a_module() -> None:
 def test_every_public_name_is_there_and_an_unknown_one_is_not() -> None:
     for name in lg.__all__:
         assert getattr(lg, name) is not None
-    assert set(lg.__all__) <= set(dir(lg))
+    assert [name for name in dir(lg) if name[0] != '_'] == sorted(
+        name for name in lg.__all__ if name[0] != '_')
     with pytest.raises(AttributeError, match="no attribute 'reed'"):
         lg.reed  # noqa: B018  # type: ignore[attr-defined]
 
@@ -287,6 +299,28 @@ def test_results_show_themselves_in_notebooks(drive: Path) -> None:
     for shown_result in (recording, recording.info(), lg.Husky(), lg.compare(drive)):
         assert '<table>' in shown_result._repr_html_()
     assert r'\frac{d}{dt}' in str(lg.Husky()._repr_latex_())
+    effects = lg.list_effects()
+    assert '<td style="text-align:left">torque_ripple</td>' in effects._repr_html_()
+
+
+def test_results_show_themselves_in_an_interpreter(drive: Path) -> None:
+    survey = lg.read(drive).info()
+    for one in (survey, survey.parameters, lg.list_effects(), lg.compare(drive)):
+        assert repr(one) == str(one)
+        assert type(one).__name__ not in repr(one)
+
+
+@pytest.mark.filterwarnings('error')
+def test_progress_in_a_notebook_without_widgets_is_a_line(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(progress, 'in_notebook', lambda: True)
+    monkeypatch.setattr(progress, 'find_spec', lambda name: None)
+    with shown(True) as report:
+        report('recalibration', 0.5)
+    said = capsys.readouterr().err
+    assert 'recalibration' in said
+    assert ' 50 %' in said
+    assert 'it/s' not in said
 
 
 def test_drawing_needs_the_right_number_of_axes(drive: Path) -> None:

@@ -79,7 +79,7 @@ def test_without_commands_or_measurements_the_survey_says_what_is_missing(
 
 
 @pytest.mark.parametrize(('stream', 'word'), [
-    ('wheels', 'No wheels (JointState)'), ('imu', 'No imu (Imu)'),
+    ('wheels', 'No wheels (JointState)'), ('imu', 'No IMU (Imu)'),
     ('pose', 'No pose (TF, Odometry or PoseStamped)')])
 def test_a_stream_that_is_missing_is_a_reservation(
         drive: lg.Recording, stream: str, word: str) -> None:

@@ -43,7 +43,7 @@ Model: TypeAlias = PathLike | Husky
 Models: TypeAlias = Model | Sequence[Model] | Mapping[str, Model] | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """
     Recordings beside the predictions of models.
@@ -225,6 +225,8 @@ class Comparison:
     def __str__(self) -> str:
         """Return the errors, and what to change, as text."""
         return f'{text_table(self.outcomes)}\n{self.what_to_change}'
+
+    __repr__ = __str__
 
     def _repr_html_(self) -> str:
         return page_part('Comparison', ['Errors are measured minus predicted.'], [self.table()], {

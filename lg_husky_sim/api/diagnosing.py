@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from lg_husky_sim.diagnosis.result import Diagnosis, Finding
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DiagnosisResult:
     """
     Which physics a model lacks. Made by :meth:`Husky.diagnose`.
@@ -104,11 +104,25 @@ class DiagnosisResult:
                      tuple(rows))
 
     def errors(self) -> Table:
-        """Return the errors on held-out data, recalibrated and with the finding."""
-        before, after = self.diagnosis.held_out_plain, self.diagnosis.held_out_augmented
-        return Table('', ('held-out error', 'recalibrated', 'with finding'), tuple(
-            (name, before.get(name), after.get(name)) for name in dict.fromkeys((*before, *after))
-            if isinstance(before.get(name, 0.0), float)))
+        """Return the errors on held-out data: nominal, recalibrated, with the finding."""
+        from lg_husky_sim.diagnosis.held_out import errors, split
+        from lg_husky_sim.reporting.data import NOMINAL, RECALIBRATED, WITH_FINDING
+        from lg_husky_sim.reporting.words import quantity_with_unit
+
+        answer = self.diagnosis
+        known = {NOMINAL: errors(self.before.plant, split(self.case.segments)[1]),
+                 RECALIBRATED: answer.held_out_plain, WITH_FINDING: answer.held_out_augmented}
+        if answer.model == answer.plain_model:
+            del known[WITH_FINDING]
+        return Table('', ('held-out error', *known), tuple(
+            (quantity_with_unit(key), *(column.get(key) for column in known.values()))
+            for key in answer.held_out_plain))
+
+    def _advice(self) -> dict[str, tuple[str, ...]]:
+        from lg_husky_sim.diagnosis.report import advice
+        shapes = {(one.id, one.side): one.shape for one in self.husky.model.structure.effects}
+        return {one.where: one.sentences
+                for one in advice(self.diagnosis, shapes, changed=bool(self.baseline))}
 
     def to_pandas(self) -> Any:
         """Return the findings' numbers as a pandas DataFrame."""
@@ -185,11 +199,14 @@ class DiagnosisResult:
         from lg_husky_sim.diagnosis.output import summary_text
         return summary_text(self.diagnosis, bool(self.baseline))
 
+    __repr__ = __str__
+
     def _repr_html_(self) -> str:
         return page_part(
             self.headline, [f'Confidence {self.confidence:.2f}',
                             *(finding.statement for finding in self.findings)],
-            [self.table(), self.errors()], {'Notes': self.diagnosis.notes})
+            [self.table(), self.errors()], {'Warnings': self.diagnosis.warnings, **self._advice(),
+                                            'Notes': self.diagnosis.notes})
 
 
 def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from lg_husky_sim.diagnosis.prediction_errors import Assessment
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fit:
     """
     Parameters estimated from recordings. Made by :meth:`Husky.identify`.
@@ -158,6 +158,8 @@ class Fit:
     def __str__(self) -> str:
         """Return the report as text."""
         return str(self.result)
+
+    __repr__ = __str__
 
     def _repr_html_(self) -> str:
         state = 'converged' if self.converged else 'NOT CONVERGED'

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import find_spec
 import sys
 import time
 from typing import Any, TypeAlias
@@ -17,6 +19,9 @@ Shown: TypeAlias = bool | Report
 
 _BAR = '{desc:40.40} {percentage:3.0f} % |{bar}| {elapsed}'
 _COUNT = '{desc:40.40} {n_fmt} [{elapsed}]'
+# Widgets have room for the whole name of a stage.
+_WIDGET_BAR = '{desc}{percentage:3.0f} %|{bar}|{elapsed}'
+_WIDGET_COUNT = '{desc}{n_fmt} |{bar}|{elapsed}'
 
 
 def in_notebook() -> bool:
@@ -53,9 +58,7 @@ def shown(progress: Shown, known: bool = True) -> Iterator[Report]:
     if not progress or not watched():
         yield lambda stage, share: None
         return
-    from tqdm.auto import tqdm
-    with tqdm(total=100 if known else None, leave=False, disable=False,
-              bar_format=None if in_notebook() else _BAR if known else _COUNT) as bar:
+    with _bar(known) as bar:
         def report(stage: str, share: float | None) -> None:
             bar.set_description(stage, refresh=False)
             if share is not None:
@@ -64,6 +67,14 @@ def shown(progress: Shown, known: bool = True) -> Iterator[Report]:
                 bar.update()
             bar.refresh()
         yield report
+
+
+def _bar(known: bool) -> Any:
+    # A widget needs ipywidgets; a notebook without it has the line of a terminal.
+    widget = in_notebook() and find_spec('ipywidgets') is not None
+    made = import_module('tqdm.notebook' if widget else 'tqdm').tqdm
+    form = (_WIDGET_BAR if known else _WIDGET_COUNT) if widget else _BAR if known else _COUNT
+    return made(total=100 if known else None, leave=False, disable=False, bar_format=form)
 
 
 class Lines:

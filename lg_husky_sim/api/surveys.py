@@ -39,8 +39,8 @@ MOST_DECIMALS = 6
 CHECKED = {
     'wheels': 'No wheels (JointState): what the motors turn is not measured, so that slip, wheel '
               'radius and drivetrain cannot be told apart',
-    'imu': 'No imu (Imu): the yaw rate is known from other streams only, and accelerations from '
-           'none',
+    'imu': 'No IMU (Imu): the yaw rate is known from other streams only, and accelerations not at '
+           'all',
     'pose': 'No pose (TF, Odometry or PoseStamped): the speed over ground is not measured, so '
             'that slip and wheel radius cannot be told, nor whether the gyro is right'}
 """Measurements, and what cannot be told without each."""
@@ -55,7 +55,7 @@ def limits() -> dict[str, float]:
     return {name: float(entry['value']) for name, entry in data['limits'].items()}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Survey:
     """
     What a recording holds and is good for. Made by :meth:`Recording.info`.
@@ -94,7 +94,7 @@ class Survey:
     undetermined: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     sensors: Table = field(default=Table('', (), ()))
-    unused: tuple[str, ...] = field(default=(), repr=False)
+    unused: tuple[str, ...] = ()
 
     @property
     def enough(self) -> bool:
@@ -142,6 +142,8 @@ class Survey:
     def __str__(self) -> str:
         """Return the survey as text."""
         return '\n\n'.join([self.heading(), *map(str, self.tables())])
+
+    __repr__ = __str__
 
     def _repr_html_(self) -> str:
         return page_part(f'{self.name}: {self.duration:.1f} s', [self.verdict], self.tables(),

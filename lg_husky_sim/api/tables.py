@@ -30,7 +30,7 @@ def is_number(value: object) -> bool:
     return value is None or (isinstance(value, (int, float)) and not isinstance(value, bool))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Table:
     """
     Rows under named columns.
@@ -58,6 +58,8 @@ class Table:
                            ).rstrip() for row in cells]
         return '\n'.join([self.title] * bool(self.title) + lines)
 
+    __repr__ = __str__
+
     def html(self) -> str:
         """Return the table as HTML; every text in it is escaped."""
         head = ''.join(f'<th>{escape(name)}</th>' for name in self.columns)
@@ -66,6 +68,8 @@ class Table:
             f'{escape(cell(value))}</td>' for value in row) + '</tr>' for row in self.rows)
         title = f'<caption>{escape(self.title)}</caption>' if self.title else ''
         return (f'<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>')
+
+    _repr_html_ = html
 
     def to_pandas(self) -> Any:
         """Return the table as a pandas DataFrame."""
@@ -84,6 +88,10 @@ class Table:
 def finite(value: object) -> object:
     """Return a value that JSON can hold."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _code(text: str) -> str:
+    return re.sub('`([^`]*)`', r'<code>\1</code>', escape(text))
 
 
 def page_part(title: str, lines: Sequence[str], tables: Sequence[Table],
@@ -105,5 +113,5 @@ def page_part(title: str, lines: Sequence[str], tables: Sequence[Table],
     for heading, items in (points or {}).items():
         if items:
             parts.append(f'<p><b>{escape(heading)}</b></p><ul>' + ''.join(
-                f'<li>{escape(item)}</li>' for item in items) + '</ul>')
+                f'<li>{_code(item)}</li>' for item in items) + '</ul>')
     return '<div class="lg-husky">' + ''.join(parts) + '</div>'
