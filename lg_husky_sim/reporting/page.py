@@ -145,7 +145,7 @@ def _parameter(one: ParameterRow) -> dict[str, Any]:
 
 def _mismatches(shown: Sequence[Mismatch], jumps: Mapping[int, int]) -> list[dict[str, Any]]:
     places = {place: number for number, place in jumps.items()}
-    return [{'recording': one.recording, 'channel': one.channel, 'start': one.start,
+    return [{'recording': breakable(one.recording), 'channel': one.channel, 'start': one.start,
              'end': one.end, 'strength': one.strength, 'part': one.part,
              'place': places.get(place)} for place, one in enumerate(shown)]
 
