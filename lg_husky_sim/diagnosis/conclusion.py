@@ -21,7 +21,6 @@ from lg_husky_sim.diagnosis.localisation import Missing, where_it_shows
 from lg_husky_sim.diagnosis.nameless import felt, left_over, needed_evidence
 from lg_husky_sim.diagnosis.result import Estimate, Finding, Indistinguishable, Verdict
 from lg_husky_sim.diagnosis.rivals import rivals_of
-from lg_husky_sim.diagnosis.selection.rounds import is_negligible
 from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.selection.ties import gains_of, is_near
 from lg_husky_sim.diagnosis.separation import separated_by
@@ -206,14 +205,11 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     tried = first.tried
     if not search.adopted:
         gain = max(tried[0].gain, 0.0) if tried else 0.0
-        features = Features(gain, 0.0, explained / max(gain, 1.0), first.chance)
+        features = Features(gain, explained / max(gain, 1.0), first.chance)
         return _sure(Verdict.UNKNOWN if is_left else Verdict.NOTHING_MISSING, features)
-    best = tried[0]
-    second = max((t.score for t in tried if t.hypothesis.effect.id != best.hypothesis.effect.id
-                  and not is_negligible(t, first.evidence.noise.values)), default=0.0)
-    told = max(explained_by(search), best.gain)
-    features = Features(best.gain, 1.0 - max(second, 0.0) / max(best.score, 1e-9),
-                        explained / told, first.chance)
+    told = max(explained_by(search), tried[0].gain)
+    features = Features(min(one.tried[0].gain for one in search.adopted), explained / told,
+                        first.chance)
     is_unknown = is_left and features.share > setting('unknown_share') and not (
         _is_its_form(search, rest))
     return _sure(Verdict.UNKNOWN if is_unknown else Verdict.KNOWN, features)

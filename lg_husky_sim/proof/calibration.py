@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 
 #: Answer to the names of its coefficients in the settings of the diagnosis.
 COEFFICIENTS = {
-    'known': ('name_constant', 'name_share', 'name_gain'),
+    'known': ('name_constant', 'name_gain'),
     'nothing_missing': ('nothing_constant', 'nothing_chance'),
     'unknown': ('unknown_constant', 'unknown_share_slope'),
     'changed': ('change_constant', 'change_chance'),
@@ -47,10 +47,17 @@ def _row(verdict: str, features: Json) -> list[float]:
     """Return what multiplies the coefficients of an answer."""
     if verdict in ('nothing_missing', 'unchanged', 'changed'):
         return [1.0, math.log10(max(float(features['chance']), 1e-12))]
-    share = math.log(min(max(float(features['share']), 1e-3), 10.0))
     if verdict == 'unknown':
-        return [1.0, share]
-    return [1.0, share, math.log10(max(float(features['gain']), 1.0))]
+        return [1.0, math.log(min(max(float(features['share']), 1e-3), 10.0))]
+    return [1.0, math.log10(max(float(features['gain']), 1.0))]
+
+
+def _weakest(line: Json) -> Json:
+    """Return the features with the gain of the weakest name; up to a version, of the first."""
+    features: Json = line['features']
+    if 'margin' not in features or not line['said']:
+        return features
+    return {**features, 'gain': min(float(one['gain']) for one in line['said'])}
 
 
 def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
@@ -79,7 +86,7 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
         answer = _answer(line)
         if line.get('features') and answer in rows and mark is not None:
             try:
-                row = _row(answer, line['features'])
+                row = _row(answer, _weakest(line))
             except (KeyError, TypeError, ValueError) as error:
                 raise LgHuskyError(f'case {line["case"]}: the features of its confidence need the '
                                    f'numbers share, chance and gain: {error}') from error

@@ -32,30 +32,32 @@ def line(name: str, right: bool, **features: Any) -> dict[str, Any]:
 
 
 def lines(count: int) -> list[dict[str, Any]]:
-    """Return outcomes that are wrong the oftener the more a smooth effort explains."""
+    """Return outcomes that are right the oftener the more their name gains."""
     rng = np.random.default_rng(2)
-    shares = rng.uniform(0.02, 1.0, count)
-    return [line(f'c{i}', bool(rng.uniform() > s), gain=30.0, share=s, chance=1e-9)
-            for i, s in enumerate(shares)]
+    gains = rng.uniform(1.0, 4.0, count)
+    return [line(f'c{i}', bool(rng.uniform() < g / 4.0), gain=10.0 ** g, share=0.1, chance=1e-9)
+            for i, g in enumerate(gains)]
 
 
-def test_a_share_that_informs_gets_weight_and_the_share_right_is_kept() -> None:
+def test_a_gain_that_informs_gets_weight_and_the_share_right_is_kept() -> None:
     rows = lines(400)
     found = calibrated(rows)
-    constant, share, gain = (found[n][0] for n in ('name_constant', 'name_share', 'name_gain'))
-    assert share < -0.5
-    stated = [1.0 / (1.0 + np.exp(-(constant + share * np.log(r['features']['share'])
-                                    + gain * np.log10(30.0)))) for r in rows]
-    assert np.mean(stated) == pytest.approx(found['name_share'][2] / 400, abs=0.02)
-    assert found['name_share'][1] == 400
+    constant, gain = (found[n][0] for n in ('name_constant', 'name_gain'))
+    assert gain > 0.5
+    stated = [1.0 / (1.0 + np.exp(-(constant + gain * np.log10(r['features']['gain']))))
+              for r in rows]
+    assert np.mean(stated) == pytest.approx(found['name_gain'][2] / 400, abs=0.02)
+    assert found['name_gain'][1] == 400
     assert found['unknown_constant'][1] == 0
 
 
-def test_names_that_gain_little_are_less_sure_if_they_are_wrong_oftener() -> None:
-    rng = np.random.default_rng(3)
-    rows = [line(f'c{i}', bool(rng.uniform() < g / 4.0), gain=10.0 ** g, share=0.1, chance=1e-9)
-            for i, g in enumerate(rng.uniform(1.0, 4.0, 300))]
-    assert calibrated(rows)['name_gain'][0] > 0.5
+def test_the_weakest_name_counts_where_the_first_was_written_down() -> None:
+    """Earlier versions wrote the gain of the first name, and the margin to the next."""
+    rows = lines(100)
+    weak = [{**row, 'features': {**row['features'], 'gain': 1e6, 'margin': 0.5},
+             'said': [{**row['said'][0], 'gain': gain}
+                      for gain in (1e6, row['features']['gain'])]} for row in rows]
+    assert calibrated(weak) == calibrated(rows)
 
 
 def test_changes_have_coefficients_of_their_own() -> None:
@@ -84,7 +86,7 @@ def test_few_outcomes_do_not_make_certainty() -> None:
 
 
 @pytest.mark.parametrize(('features', 'named'), [
-    ({'gain': 9.0, 'share': 0.1}, 'case bad'), ({'gain': 9.0, 'share': None, 'chance': 1.0},
+    ({'gain': 9.0, 'share': 0.1}, 'case bad'), ({'gain': None, 'share': 0.1, 'chance': 1.0},
                                                 'case bad'), ({}, 'no outcome')])
 def test_outcomes_without_what_it_needs_are_refused(features: dict[str, Any], named: str) -> None:
     damaged = {**line('bad', True, **features), 'verdict': 'nothing_missing'}
@@ -100,7 +102,7 @@ def test_command_prints_what_stands_in_the_settings(
     outcomes.write(path, {'command': 'c', 'commit': 'x', 'planned': 5, 'seal': '', 'seeds': '-',
                           'set': 'tuning'}, lines(5))
     assert run(['prove', '--from', str(path), '--calibrate']) == 0
-    assert 'name_share: ' in capsys.readouterr().out
+    assert 'name_gain: ' in capsys.readouterr().out
     assert run(['prove', '--calibrate']) != 0
     assert '--from' in capsys.readouterr().err
 
@@ -111,4 +113,4 @@ def test_what_is_fitted_is_what_the_diagnosis_uses(verdict: Verdict, value: floa
     # The trial shares no code with the diagnosis, so that both say what informs.
     assert calibration.COEFFICIENTS[verdict.value] == confidence.COEFFICIENTS[verdict]
     assert calibration._row(verdict.value, {'share': value, 'chance': value, 'gain': value}) == [
-        1.0, *confidence.informs(verdict, confidence.Features(value, 1.0, value, value))]
+        1.0, *confidence.informs(verdict, confidence.Features(value, value, value))]

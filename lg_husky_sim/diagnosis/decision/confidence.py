@@ -6,8 +6,8 @@ How sure an answer is, by a logistic function of what informs about it.
 For each verdict ``p = 1 / (1 + exp(-(c0 + c1 x1 + ...)))``. Posterior odds carry no information:
 the form of no law is exact, so that they are near 1 for right and wrong names alike. The margin to
 the next name is not used: where it is small, the names are declared not to be told apart. What
-informs of a name is what a smooth effort still explains as a share of what the name explains,
-``x1 = log(share)``, and how much that is, ``x2 = log10(gain)``; of ``unknown``, that share; of
+informs of the names is how much the one that gains least does, ``x1 = log10(gain)``; of
+``unknown``, what a smooth effort explains over what the names do, ``x1 = log(share)``; of
 ``nothing``, how far the largest gain is beyond chance, ``x1 = log10(chance)``.
 """
 
@@ -21,7 +21,7 @@ from lg_husky_sim.diagnosis.settings import setting
 
 #: Verdict to the settings that are its coefficients, c0, c1, ...
 COEFFICIENTS = {
-    Verdict.KNOWN: ('name_constant', 'name_share', 'name_gain'),
+    Verdict.KNOWN: ('name_constant', 'name_gain'),
     Verdict.NOTHING_MISSING: ('nothing_constant', 'nothing_chance'),
     Verdict.UNKNOWN: ('unknown_constant', 'unknown_share_slope'),
 }
@@ -35,18 +35,14 @@ class Features:
     Parameters
     ----------
     gain : float
-        Of the first name [nats].
-    margin : float
-        1 - score of the next name / score of the first, 0 to 1; less where the first is not the
-        one of the largest score.
+        Of the name that gains least, or of the best one where none is adopted [nats].
     share : float
-        Evidence of a smooth effort beside the name over the gain of the name.
+        Evidence of a smooth effort beside the names over what these gain.
     chance : float
         Probability of such a gain on a robot that lacks nothing.
     """
 
     gain: float
-    margin: float
     share: float
     chance: float
 
@@ -68,11 +64,10 @@ def informs(verdict: Verdict, features: Features) -> tuple[float, ...]:
     """
     if verdict is Verdict.NOTHING_MISSING:
         return (math.log10(max(features.chance, setting('least_chance'))),)
-    share = math.log(min(max(features.share, setting('least_told_share')),
-                         setting('most_told_share')))
     if verdict is Verdict.UNKNOWN:
-        return (share,)
-    return share, math.log10(max(features.gain, setting('least_told_gain')))
+        return (math.log(min(max(features.share, setting('least_told_share')),
+                             setting('most_told_share'))),)
+    return (math.log10(max(features.gain, setting('least_told_gain'))),)
 
 
 def confidence(verdict: Verdict, features: Features) -> float:
