@@ -16,6 +16,7 @@ from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.evaluation.drive_dataset import read_drive
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
+from lg_husky_sim.husky.model_reader import MOST_ERRORS
 from lg_husky_sim.linear_graph import compile_numeric
 from lg_husky_sim.linear_graph.netlist import parse_netlist
 from lg_husky_sim.manoeuvres import load_manoeuvre
@@ -91,12 +92,13 @@ class Reader:
     text: bool = False
 
 
-def _one_line(path: Path, read: Callable[[Path], Any]) -> Any:
-    """Read a file; a refusal must be one line of less than two thousand characters."""
+def _one_line(path: Path, read: Callable[[Path], Any], errors: int = 1) -> Any:
+    """Read a file; an error must be one line of less than two thousand characters."""
     try:
         return read(path)
     except LgHuskyError as error:
-        sensible('\n' not in str(error) and len(str(error)) < 2000, f'message: {error}')
+        lines = str(error).splitlines()
+        sensible(len(lines) <= errors and max(map(len, lines)) < 2000, f'message: {error}')
         raise
 
 
@@ -199,7 +201,8 @@ def _models(folder: Path) -> list[bytes]:
 
 
 def _read_model(data: bytes, folder: Path) -> None:
-    model = _one_line(_written(folder, 'one.yaml', data), load_model)
+    # Several errors are listed, one a line.
+    model = _one_line(_written(folder, 'one.yaml', data), load_model, MOST_ERRORS + 2)
     for name, value in model.parameters.items():
         entry = model.parameters.entry(name)
         sensible(math.isfinite(value) and entry.lower <= value <= entry.upper,

@@ -244,6 +244,8 @@ def read_yaml(path: str | os.PathLike[str], error: type[LgHuskyError]) -> dict[s
         raise error('not a text file') from cause
     except OSError as cause:
         raise error(cause.strerror or str(cause)) from cause
+    except ValueError as cause:  # a name that no file can have
+        raise error(str(cause)) from cause
     try:
         data = parse_yaml(text)
     except ValueError as cause:

@@ -95,3 +95,5 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         read_yaml(tmp_path / 'absent.yaml', CommandError)
     with pytest.raises(CommandError, match='Is a directory'):
         read_yaml(tmp_path, CommandError)
+    with pytest.raises(CommandError, match='null byte'):
+        read_yaml('no\0file.yaml', CommandError)
