@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 import json
 import math
 from pathlib import Path
@@ -31,7 +32,7 @@ from lg_husky_sim.reporting.words import (
     SIGN,
     with_unit,
 )
-from lg_husky_sim.reporting.write import write_report
+from lg_husky_sim.reporting.write import view_of, write_report
 import numpy as np
 
 MARKER = 'compare.json'
@@ -123,15 +124,22 @@ def report_data(
     if settings:
         notes.append('Set in every model: ' + ', '.join(
             f'`{name} = {value:g}`' for name, value in settings.items()) + '.')
-    notes += _scatter_notes(traces)
+    scattered = _scatters(traces)
+    notes += [f'{name}: the measured forward speed is the rate of change of the pose, and has a '
+              f'scatter of at least {number(scatter, 2)} m/s of its own: that part of its error '
+              'is not due to a model.' for name, scatter in scattered.items()]
     notes += [f'{outcome.recording.name}: {note}' for outcome in outcomes
               for note in (*outcome.recording.notes, *outcome.gaps())]
     names = ', '.join(outcome.recording.name for outcome in outcomes)
-    return ReportData(
+    data = ReportData(
         f'Comparison with {names}', _headline(tables[0], len(outcomes), seconds), columns,
         tuple(about), traces, tuple(tables), advice=tuple(advice), notes=tuple(notes),
         files=(('compare.json', 'has all numbers'), ('compare.txt', 'has the tables')),
         provenance=provenance or Provenance())
+    # What is shown first is a difference of a model, not the scatter of a pose.
+    steady = tuple(one for one in traces
+                   if one.channel != 'forward' or one.recording not in scattered)
+    return replace(data, view=view_of(replace(data, traces=steady)))
 
 
 def _headline(table: ErrorTable, recordings: int, seconds: float) -> Headline:
@@ -160,9 +168,9 @@ def _headline(table: ErrorTable, recordings: int, seconds: float) -> Headline:
                    f'{with_unit(second, unit)}.',))
 
 
-def _scatter_notes(traces: Sequence[Trace]) -> list[str]:
-    # The rate of change of a noisy pose is noisy: that part of the error is no model's.
-    said = []
+def _scatters(traces: Sequence[Trace]) -> dict[str, float]:
+    """Return by recording the scatter [m/s] of a forward speed that is noise for a good part."""
+    found = {}
     for trace in (one for one in traces if one.channel == 'forward' and one.times.size > 1):
         step = max(1, round(WINDOW / max(float(np.median(np.diff(trace.times))), 1e-3)))
         bends = np.diff(trace.measured[::step], 2)  # slopes that share no sample
@@ -172,8 +180,5 @@ def _scatter_notes(traces: Sequence[Trace]) -> list[str]:
             continue
         scatter = float(np.median(np.abs(bends))) / 0.6745 / math.sqrt(6.0)
         if scatter > SCATTER * min(float(np.sqrt(np.nanmean(error ** 2))) for error in errors):
-            said.append(f'{trace.recording}: the measured forward speed is the rate of change of '
-                        f'the pose, and has a scatter of at least {number(scatter, 2)} m/s of '
-                        'its own: '
-                        'that part of its error is not due to a model.')
-    return said
+            found[trace.recording] = scatter
+    return found

@@ -11,7 +11,9 @@ from pathlib import Path
 import re
 from typing import Any
 
+import lg_husky_sim as lg
 from lg_husky_sim.cli.main import run
+from lg_husky_sim.comparison.page import report_data
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model, ModelFile, save_model
@@ -297,3 +299,17 @@ def test_a_name_that_is_not_utf_8_is_no_reason_to_lose_results(bag: Path, tmp_pa
     assert run(['compare', str(place), '--out', str(tmp_path / 'result')]) == 0
     data = json.loads((tmp_path / 'result' / 'compare.json').read_text(encoding='utf-8'))
     assert data['recordings'][0]['name'] == 'caf?'
+
+
+def test_a_page_does_not_begin_with_the_scatter_of_a_pose() -> None:
+    drive = lg.Husky(mass=60.0).simulate('s_bend')
+    pose = drive.pose
+    noise = np.random.default_rng(2).normal(0.0, 0.05, pose.values.shape) * (1.0, 1.0, 0.0)
+    noisy = replace(drive, streams={**drive.streams, 'pose': TimeSeries(
+        pose.times, pose.values + noise, pose.names)})
+    pages = [report_data(found.outcomes, found.plants)
+             for found in (lg.compare(drive), lg.compare(noisy))]
+    assert [sum('has a scatter of at least' in note for note in page.notes)
+            for page in pages] == [0, 1]
+    assert all(page.view is not None for page in pages)
+    assert pages[1].view.channel != 'forward'  # type: ignore[union-attr]
