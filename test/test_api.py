@@ -50,7 +50,7 @@ def test_each_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.Monke
     assert position[0] == 'position [m]'
     assert position[1:3] > (0.1, 0.1) > position[3:]
     html = found._repr_html_()
-    assert '<th>nominal</th>' in html
+    assert '>nominal</th>' in html
     assert html.index('On the robot') < html.index('In the simulator')
     assert '<code>ros2 run lg_husky_sim sim_node' in html
     assert repr(found) == str(found)

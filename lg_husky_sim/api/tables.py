@@ -47,12 +47,16 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[object, ...], ...]
 
+    def flush(self) -> list[bool]:
+        """Return which columns hold numbers only and are set flush right."""
+        return [bool(self.rows) and all(is_number(row[k]) for row in self.rows)
+                for k in range(len(self.columns))]
+
     def __str__(self) -> str:
         """Return the table as text, columns aligned."""
         cells = [self.columns, *(tuple(map(cell, row)) for row in self.rows)]
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        right = [bool(self.rows) and all(is_number(row[k]) for row in self.rows)
-                 for k in range(len(self.columns))]
+        right = self.flush()
         lines = ['  '.join(text.rjust(width) if flush else text.ljust(width)
                            for text, width, flush in zip(row, widths, right, strict=True)
                            ).rstrip() for row in cells]
@@ -62,10 +66,12 @@ class Table:
 
     def html(self) -> str:
         """Return the table as HTML; every text in it is escaped."""
-        head = ''.join(f'<th>{escape(name)}</th>' for name in self.columns)
+        sides = ['right' if flush else 'left' for flush in self.flush()]
+        head = ''.join(f'<th style="text-align:{side}">{escape(name)}</th>'
+                       for name, side in zip(self.columns, sides, strict=True))
         body = ''.join('<tr>' + ''.join(
-            f'<td style="text-align:{"right" if is_number(value) else "left"}">'
-            f'{escape(cell(value))}</td>' for value in row) + '</tr>' for row in self.rows)
+            f'<td style="text-align:{side}">{escape(cell(value))}</td>'
+            for value, side in zip(row, sides, strict=True)) + '</tr>' for row in self.rows)
         title = f'<caption>{escape(self.title)}</caption>' if self.title else ''
         return (f'<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>')
 

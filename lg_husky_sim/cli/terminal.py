@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import re
 from typing import Any
 
-from lg_husky_sim.api.tables import cell, is_number, Table
+from lg_husky_sim.api.tables import cell, Table
 
 #: Columns between two columns of a table.
 GAP = 2
@@ -34,13 +34,13 @@ def print_table(table: Table, console: Any) -> None:
     names = [table.columns[place] for place in shown]
     cells = [[cell(row[place]) for place in shown] for row in table.rows]
     widths = _widths([names, *cells], console.width)
+    flush = table.flush()
     grid = Grid(box=SIMPLE_HEAD, header_style='bold cyan', padding=(0, GAP - 1, 0, 0),
                 pad_edge=False, show_edge=False)
-    for number, (name, width) in enumerate(zip(names, widths, strict=True)):
-        flush = bool(table.rows) and all(is_number(row[shown[number]]) for row in table.rows)
+    for place, name, width in zip(shown, names, widths, strict=True):
         # Text, since rich takes the unit [s] for a markup.
-        grid.add_column(Text(name), justify='right' if flush else 'left', width=width,
-                        style='bold' if number == 0 else '')
+        grid.add_column(Text(name), justify='right' if flush[place] else 'left', width=width,
+                        style='bold' if place == 0 else '')
     for row in cells:
         broken = map(_broken, row, widths)
         grid.add_row(*map(Text, broken))
