@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 @model_option('--robot', '--model', 'robot')
 @settings_option
 @topics_option
+@click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
+              help='Kept for old scripts: the search uses no random numbers.')
 @click.option('--jobs', type=click.IntRange(min=1), default=None, metavar='N',
               help='Threads to use; as many as there are cores by default.')
 @click.option('--report/--no-report', 'with_report', default=True, show_default=True,
@@ -41,7 +43,7 @@ if TYPE_CHECKING:
 @spoken(page=True)
 def command(
     recordings: tuple[str, ...], out: Path, baselines: tuple[str, ...], robot: Path | None,
-    settings: dict[str, float], topics: TopicMap, jobs: int | None,
+    settings: dict[str, float], topics: TopicMap, seed: int, jobs: int | None,
     with_report: bool, say: Output,
 ) -> None:
     """
@@ -56,6 +58,7 @@ def command(
     from lg_husky_sim.reporting.provenance import given_command
     from lg_husky_sim.reporting.write import check_extras
 
+    del seed
     check_folder(out)
     if with_report:
         check_extras()
