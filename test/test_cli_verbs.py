@@ -43,6 +43,13 @@ def completions(words: list[str], incomplete: str) -> tuple[list[str], set[str]]
     return [item.value for item in found], {item.type for item in found}
 
 
+def test_diagnose_takes_what_other_programs_call_it_with() -> None:
+    """Scorers and scripts pass all of these; an option that goes breaks each of them."""
+    assert {'--out', '--baseline', '--robot', '--set', '--seed', '--jobs'} <= {
+        name for option in main.cli.get_command(click.Context(main.cli), 'diagnose').params
+        for name in option.opts}
+
+
 @pytest.mark.parametrize('verb', ['compare', 'identify', 'diagnose', 'info'])
 def test_recordings_are_completed_as_files(verb: str) -> None:
     assert completions([verb], '') == ([''], {'file'})

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 @settings_option
 @topics_option
 @click.option('--seed', type=click.IntRange(min=0), default=0, show_default=True,
-              help='Kept for old scripts: the search uses no random numbers.')
+              help='Other programs give it; the search uses no random numbers.')
 @click.option('--jobs', type=click.IntRange(min=1), default=None, metavar='N',
               help='Threads to use; as many as there are cores by default.')
 @click.option('--report/--no-report', 'with_report', default=True, show_default=True,
