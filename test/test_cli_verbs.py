@@ -45,9 +45,10 @@ def completions(words: list[str], incomplete: str) -> tuple[list[str], set[str]]
 
 def test_diagnose_takes_what_other_programs_call_it_with() -> None:
     """Scorers and scripts pass all of these; an option that goes breaks each of them."""
+    verb = main.cli.get_command(click.Context(main.cli), 'diagnose')
+    assert verb is not None
     assert {'--out', '--baseline', '--robot', '--set', '--seed', '--jobs'} <= {
-        name for option in main.cli.get_command(click.Context(main.cli), 'diagnose').params
-        for name in option.opts}
+        name for option in verb.params for name in option.opts}
 
 
 @pytest.mark.parametrize('verb', ['compare', 'identify', 'diagnose', 'info'])
