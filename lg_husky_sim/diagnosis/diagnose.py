@@ -177,7 +177,7 @@ def _diagnosis(found: Search, left: Search, rest: Sequence[Effort], free: Sequen
             names = ()
     culprit = names[0].subsystem if names else None
     plain_out, augmented_out = held_out_errors(found, parts)
-    about = '; '.join(f.statement for f in names) or 'recalibrated, nothing named'
+    about = ' '.join(f.statement for f in names) or 'recalibrated, nothing named'
     nearest = _nearest(found) if said.verdict is Verdict.UNKNOWN else ''
     groups = indistinguishable(found) if said.verdict is Verdict.KNOWN else ()
     diagnosis = Diagnosis(

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 #: Factor of a law that is switched off: no Stribeck share.
 _ABSENT = re.compile(r'\(1\+\(0\.0\)\*exp\([^*]*\*\*2\)\)\*')
 #: Term of a law whose factor is zero.
-_ZERO = re.compile(r'[+-]?\(?0\.0\)?\*(sin|cos)\([^()]*\)|\+0\*\(0\.0\)')
+_ZERO = re.compile(r'[+-]?\(?0\.0\)?\*(sin|cos)\([^()]*\)|\+0\*\w*\([^()]*\)')
 
 
 def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:

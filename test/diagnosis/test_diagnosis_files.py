@@ -12,6 +12,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+import lg_husky_sim as lg
 from lg_husky_sim.cli.main import run
 from lg_husky_sim.diagnosis.diagnose import _mended, Case
 from lg_husky_sim.diagnosis.output import write_files
@@ -168,6 +169,14 @@ def test_new_element_stands_in_graph_and_equations(diagnosed: Callable[[str], Ca
     assert law.startswith('F_yaw_scrub_coulomb = -(yaw_coulomb_moment)*')
     factor = float(re.findall(r'\+([\d.]+) · F_yaw', equation)[0])
     assert factor == pytest.approx(1.0 / case.diagnosis.model.parameters['yaw_inertia'], rel=1e-3)
+
+
+def test_no_law_is_shown_with_terms_that_are_zero() -> None:
+    nominal = lg.Husky()
+    shown = [line for name in catalogue() for line in new_terms(
+        nominal.with_effect(name).model, nominal.model.structure)]
+    assert any('in_play*i(L_1)' in line for line in shown)
+    assert not [line for line in shown if re.search(r'\b0(\.0)?\)?\*', line)]
 
 
 def test_a_report_that_cannot_be_made_costs_no_result(
