@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 
 #: Answer to the names of its coefficients in the settings of the diagnosis.
 COEFFICIENTS = {
-    'known': ('name_constant', 'name_gain'),
+    'known': ('name_constant', 'name_share', 'name_gain'),
     'nothing_missing': ('nothing_constant', 'nothing_chance'),
     'unknown': ('unknown_constant', 'unknown_share_slope'),
     'changed': ('change_constant', 'change_chance'),
@@ -47,9 +47,10 @@ def _row(verdict: str, features: Json) -> list[float]:
     """Return what multiplies the coefficients of an answer."""
     if verdict in ('nothing_missing', 'unchanged', 'changed'):
         return [1.0, math.log10(max(float(features['chance']), 1e-12))]
+    share = math.log(min(max(float(features['share']), 1e-3), 10.0))
     if verdict == 'unknown':
-        return [1.0, math.log(min(max(float(features['share']), 1e-3), 10.0))]
-    return [1.0, math.log10(max(float(features['gain']), 1.0))]
+        return [1.0, share]
+    return [1.0, share, math.log10(max(float(features['gain']), 1.0))]
 
 
 def _weakest(line: Json) -> Json:

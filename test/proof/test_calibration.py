@@ -42,13 +42,21 @@ def lines(count: int) -> list[dict[str, Any]]:
 def test_a_gain_that_informs_gets_weight_and_the_share_right_is_kept() -> None:
     rows = lines(400)
     found = calibrated(rows)
-    constant, gain = (found[n][0] for n in ('name_constant', 'name_gain'))
+    constant, share, gain = (found[n][0] for n in ('name_constant', 'name_share', 'name_gain'))
     assert gain > 0.5
-    stated = [1.0 / (1.0 + np.exp(-(constant + gain * np.log10(r['features']['gain']))))
-              for r in rows]
+    stated = [1.0 / (1.0 + np.exp(-(constant + share * np.log(0.1)
+                                    + gain * np.log10(r['features']['gain'])))) for r in rows]
     assert np.mean(stated) == pytest.approx(found['name_gain'][2] / 400, abs=0.02)
     assert found['name_gain'][1] == 400
     assert found['unknown_constant'][1] == 0
+
+
+def test_a_share_that_informs_gets_weight() -> None:
+    """Outcomes that are wrong the oftener the more a smooth effort explains."""
+    rng = np.random.default_rng(5)
+    rows = [line(f'c{i}', bool(rng.uniform() > s), gain=30.0, share=s, chance=1e-9)
+            for i, s in enumerate(rng.uniform(0.02, 1.0, 400))]
+    assert calibrated(rows)['name_share'][0] < -0.5
 
 
 def test_the_weakest_name_counts_where_the_first_was_written_down() -> None:
@@ -86,7 +94,7 @@ def test_few_outcomes_do_not_make_certainty() -> None:
 
 
 @pytest.mark.parametrize(('features', 'named'), [
-    ({'gain': 9.0, 'share': 0.1}, 'case bad'), ({'gain': None, 'share': 0.1, 'chance': 1.0},
+    ({'gain': 9.0, 'share': 0.1}, 'case bad'), ({'gain': 9.0, 'share': None, 'chance': 1.0},
                                                 'case bad'), ({}, 'no outcome')])
 def test_outcomes_without_what_it_needs_are_refused(features: dict[str, Any], named: str) -> None:
     damaged = {**line('bad', True, **features), 'verdict': 'nothing_missing'}

@@ -6,9 +6,10 @@ How sure an answer is, by a logistic function of what informs about it.
 For each verdict ``p = 1 / (1 + exp(-(c0 + c1 x1 + ...)))``. Posterior odds carry no information:
 the form of no law is exact, so that they are near 1 for right and wrong names alike. The margin to
 the next name is not used: where it is small, the names are declared not to be told apart. What
-informs of the names is how much the one that gains least does, ``x1 = log10(gain)``; of
-``unknown``, what a smooth effort explains over what the names do, ``x1 = log(share)``; of
-``nothing``, how far the largest gain is beyond chance, ``x1 = log10(chance)``.
+informs of the names is what a smooth effort still explains as a share of what they explain,
+``x1 = log(share)``, and how much the one that gains least does, ``x2 = log10(gain)``; of
+``unknown``, that share; of ``nothing``, how far the largest gain is beyond chance,
+``x1 = log10(chance)``.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from lg_husky_sim.diagnosis.settings import setting
 
 #: Verdict to the settings that are its coefficients, c0, c1, ...
 COEFFICIENTS = {
-    Verdict.KNOWN: ('name_constant', 'name_gain'),
+    Verdict.KNOWN: ('name_constant', 'name_share', 'name_gain'),
     Verdict.NOTHING_MISSING: ('nothing_constant', 'nothing_chance'),
     Verdict.UNKNOWN: ('unknown_constant', 'unknown_share_slope'),
 }
@@ -64,10 +65,11 @@ def informs(verdict: Verdict, features: Features) -> tuple[float, ...]:
     """
     if verdict is Verdict.NOTHING_MISSING:
         return (math.log10(max(features.chance, setting('least_chance'))),)
+    share = math.log(min(max(features.share, setting('least_told_share')),
+                         setting('most_told_share')))
     if verdict is Verdict.UNKNOWN:
-        return (math.log(min(max(features.share, setting('least_told_share')),
-                             setting('most_told_share'))),)
-    return (math.log10(max(features.gain, setting('least_told_gain'))),)
+        return (share,)
+    return share, math.log10(max(features.gain, setting('least_told_gain')))
 
 
 def confidence(verdict: Verdict, features: Features) -> float:
