@@ -16,6 +16,7 @@ from lg_husky_sim.diagnosis.conclusion import (
     without_undetermined,
 )
 from lg_husky_sim.diagnosis.decision.confidence import Features
+from lg_husky_sim.diagnosis.error_tables import with_nominal
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -137,8 +138,8 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
                 different, found, said.held_out_plain, recordings, parts, sized, there, pool))
     sensors = tuple(f.statement for f in seen)
     notes = (*said.notes, *_supplied(nominal, numbers), *_mended(recordings))
-    return Case(replace(said, notes=notes, sensors=sensors), found,
-                parts, nominal, rest, features)
+    said = with_nominal(replace(said, notes=notes, sensors=sensors), nominal, parts, names)
+    return Case(said, found, parts, nominal, rest, features)
 
 
 def _supplied(nominal: ModelFile, numbers: Parameters) -> tuple[str, ...]:

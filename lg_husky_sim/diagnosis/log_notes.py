@@ -66,12 +66,19 @@ def reading_notes(drives: Sequence[Drive], reading: Reading) -> tuple[str, ...]:
     rated = any(d.wheel_times.size and not d.counted for d in drives)
     # One that is as it began has not been found.
     begun = (Reading().wheels, setting('wheel_window')) == (reading.wheels, window)
-    if rated and window > setting('shortest_window') and not begun:
+    filtered = reading.wheels is WheelReading.FILTERED
+    lag = 0.0 if filtered else reading.get('wheel_smoothing')
+    if rated and max(window, lag) > setting('shortest_window') and (lag or not begun):
         kind = {WheelReading.WINDOW_END: 'means over {} ms before their stamps',
                 WheelReading.WINDOW_MIDDLE: 'means over {} ms around their stamps',
                 WheelReading.WINDOW_START: 'means over {} ms after their stamps',
                 WheelReading.FILTERED: 'behind a first-order low pass of {} ms'}[reading.wheels]
-        notes.append('wheel rates seem to be ' + kind.format(f'{1e3 * window:.0f}'))
+        mean = reading.get('wheel_mean') if filtered else 0.0
+        before = f'means over {1e3 * mean:.0f} ms ' if mean > setting('shortest_window') else ''
+        after = f', behind a first-order filter of the messages of {1e3 * lag:.0f} ms' if (
+            lag > setting('shortest_window')) else ''
+        notes.append('wheel rates seem to be ' + before + kind.format(f'{1e3 * window:.0f}')
+                     + after)
     if reading.imu is not None and any(d.imu_times.size for d in drives):
         length = f'{1e3 * reading.get("imu_window"):.0f} ms'
         notes.append('yaw rates of the IMU seem to be ' + (

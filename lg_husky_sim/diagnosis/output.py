@@ -4,26 +4,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 import json
 from pathlib import Path
 
 from lg_husky_sim.diagnosis.before_after.diagnose_change import ChangeCase
 from lg_husky_sim.diagnosis.before_after.report import change_report
 from lg_husky_sim.diagnosis.diagnose import Case
+from lg_husky_sim.diagnosis.error_tables import error_tables, with_details, with_nominal
 from lg_husky_sim.diagnosis.report import headline as page_headline
 from lg_husky_sim.diagnosis.report import unexplained_sensors
 from lg_husky_sim.diagnosis.report_of_case import case_report
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Verdict
 from lg_husky_sim.husky.model_file import save_model
-from lg_husky_sim.reporting.data import Provenance, RECALIBRATED, WITH_FINDING
-from lg_husky_sim.reporting.words import quantity_with_unit
+from lg_husky_sim.reporting.data import ErrorTable, Provenance, ReportData
+from lg_husky_sim.reporting.page import change_words, error_cells
+from lg_husky_sim.reporting.sections import Cell
 from lg_husky_sim.reporting.write import write_report
 
 #: File that marks a folder of this kind.
 MARKER = 'diagnosis.json'
-_ROWS = tuple((key, quantity_with_unit(key)) for key in (
-    'position_rmse_m', 'wheel_speed_rmse', 'yaw_rate_rmse', 'forward_rmse', 'max_abs_x_m',
-    'max_abs_y_m'))
+#: Width of the names of errors, and of the numbers of a model.
+NAMES, NUMBERS = 25, 13
 
 
 def headline(diagnosis: Diagnosis, changed: bool = False) -> str:
@@ -40,14 +43,6 @@ def headline(diagnosis: Diagnosis, changed: bool = False) -> str:
                     'Something is missing that is not in the catalogue.')
         case Verdict.KNOWN:
             return f'{page_headline(diagnosis, changed=changed).text}.'
-
-
-def error_table(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
-    """Return rows of errors: name, plain, augmented, held-out plain, held-out augmented."""
-    columns = (diagnosis.plain, diagnosis.augmented, diagnosis.held_out_plain,
-               diagnosis.held_out_augmented)
-    return [(label, *(f'{c[key]:.4g}' if key in c else '-' for c in columns))  # type: ignore[misc]
-            for key, label in _ROWS if any(key in c for c in columns)]
 
 
 def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
@@ -80,7 +75,7 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
     for group in diagnosis.indistinguishable:
         lines.append(f'  indistinguishable: {", ".join(group.effects)}; '
                      f'would separate them: {"; ".join((*group.sensors, *group.manoeuvres))}')
-    lines += _error_lines(diagnosis)
+    lines += _error_lines(error_tables(diagnosis, changed))
     if diagnosis.fits:
         lines.append(f'  remaining: {diagnosis.remaining}')
     lines.extend(f'  sensors compared with each other: {text}'
@@ -89,18 +84,19 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
     return '\n'.join(lines)
 
 
-def _error_lines(diagnosis: Diagnosis) -> list[str]:
-    # Without a second column of the same numbers where nothing was added.
-    shown = (RECALIBRATED,) if diagnosis.model == diagnosis.plain_model else (
-        RECALIBRATED, WITH_FINDING)
-    places = [*range(len(shown)), *range(2, 2 + len(shown))]
-    wide = 13 * len(shown)
-    lines = [f'  {"error on":22}{"all data:":>{wide}}  {"held-out data:":>{max(wide, 15)}}',
-             f'  {"":22}' + f'{"".join(f"{name:>13}" for name in shown)}  ' * 2]
-    for label, *cells in error_table(diagnosis):
-        texts = [f'{cells[place]:>13}' for place in places]
-        lines.append(f'  {label:22}{"".join(texts[:len(shown)])}  {"".join(texts[len(shown):])}')
-    return lines
+def _error_lines(tables: Sequence[ErrorTable]) -> list[str]:
+    # The cells of the page, whose colours are words here; one head for tables of like columns.
+    lines: list[str] = []
+    for table in tables:
+        shown = error_cells(table)
+        lines.append(f'  {table.title.lower():{NAMES}}' + ''.join(
+            f'{name:>{NUMBERS}}' for name in shown.head[1:]))
+        for label, *cells in shown.rows:
+            lines.append(f'  {label!s:{NAMES}}' + ''.join(
+                f'{change_words(one) if isinstance(one, Cell) else one:>{NUMBERS}}'
+                for one in cells).rstrip())
+    return [*lines, f'  change: from {tables[0].columns[-2]} to {tables[0].columns[-1]}'] if (
+        lines) else []
 
 
 def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,
@@ -122,7 +118,7 @@ def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,
     str
         Why there is no report, if one was asked for and cannot be made; empty otherwise.
     """
-    diagnosis = case.diagnosis
+    diagnosis = with_nominal(case.diagnosis, case.nominal, case.segments)
     save_model(diagnosis.model, folder / 'model.yaml')
     save_model(diagnosis.plain_model, folder / 'plain.yaml')
     (folder / 'diagnosis.txt').write_text(
@@ -132,8 +128,15 @@ def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,
         + '\n', encoding='utf-8')
     if with_report:
         try:
-            write_report(change_report(case, provenance) if isinstance(case, ChangeCase)
-                         else case_report(case, provenance), folder)
+            write_report(_report(case, diagnosis, provenance), folder)
         except Exception as error:  # the answer is worth more than its report
             return f'report.html could not be made: {type(error).__name__}: {error}'
     return ''
+
+
+def _report(case: Case | ChangeCase, diagnosis: Diagnosis, provenance: Provenance | None
+            ) -> ReportData:
+    if isinstance(case, Case):
+        return case_report(case, provenance)
+    data = change_report(case, provenance)
+    return replace(data, errors=with_details(error_tables(diagnosis, True), data.errors))

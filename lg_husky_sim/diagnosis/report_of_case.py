@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
 from lg_husky_sim.diagnosis.diagnose import Case
-from lg_husky_sim.diagnosis.held_out import errors, split, stretches_of
+from lg_husky_sim.diagnosis.error_tables import error_tables, with_details
+from lg_husky_sim.diagnosis.held_out import stretches_of
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES
 from lg_husky_sim.diagnosis.localisation import Missing, missing_efforts, strengths
 from lg_husky_sim.diagnosis.nameless import needed_evidence
@@ -26,8 +27,6 @@ from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.linear_graph import Branch, LinearGraph
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.reporting.data import (
-    ErrorRow,
-    ErrorTable,
     NOMINAL,
     ParameterRow,
     Provenance,
@@ -36,7 +35,6 @@ from lg_husky_sim.reporting.data import (
     WITH_FINDING,
 )
 from lg_husky_sim.reporting.sections import Cell, Chart, Drawing, Line, Section, Table
-from lg_husky_sim.reporting.words import quantity_with_unit
 import numpy as np
 
 if TYPE_CHECKING:
@@ -63,8 +61,7 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
     """
     diagnosis = case.diagnosis
     plants = {NOMINAL: _plant(case.nominal), RECALIBRATED: case.search.plain.point.plant}
-    changed = diagnosis.model.structure != diagnosis.plain_model.structure
-    if changed and diagnosis.findings:
+    if diagnosis.added:
         plants[WITH_FINDING] = _plant(diagnosis.model)
     columns = tuple(plants)
     parts: list[Predicted] = [
@@ -72,14 +69,14 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
                    for label, plant in plants.items()})
         for stretch in _stretches(case.segments)]
     pair = (columns[-2], columns[-1])
-    tables = [*_held_out(case, columns),
-              error_table('All data', parts, columns, compared=pair)]
+    tables = [error_table('All data', parts, columns, compared=pair)]
     if len({s.recording for s in case.segments}) > 1:
         tables += [replace(table, title=f'Recording {table.title}', folded=True)
                    for table in recording_tables(parts, columns, pair)]
     return report_data(
         diagnosis, list(dict.fromkeys(s.recording for s in case.segments)),
-        traces_of(parts, columns), tables, _parameters(case),
+        traces_of(parts, columns), with_details(error_tables(diagnosis), tables),
+        _parameters(case),
         shapes={(e.id, e.side): e.shape for e in diagnosis.model.structure.effects},
         sections=(*_tried('Where in the model', lambda: _where(case)),
                   *_tried('A more informative drive', lambda: _telling(case))),
@@ -107,22 +104,6 @@ def _plant(model: ModelFile) -> Plant:
 def _stretches(segments: Sequence[Segment]) -> list[Segment]:
     # No longer than the errors of a diagnosis are taken over, each from its measured start.
     return [stretch for segment in segments for stretch in stretches_of(segment)]
-
-
-def _held_out(case: Case, columns: Sequence[str]) -> list[ErrorTable]:
-    diagnosis = case.diagnosis
-    if not diagnosis.held_out_plain:
-        return []
-    _, test = split(case.segments)
-    known = {NOMINAL: errors(_plant(case.nominal), test), RECALIBRATED: diagnosis.held_out_plain,
-             WITH_FINDING: diagnosis.held_out_augmented}
-    rows = tuple(ErrorRow(quantity_with_unit(key), {
-        name: known[name][key] for name in columns if key in known[name]})
-        for key in diagnosis.held_out_plain)
-    return [ErrorTable(
-        'Held-out data', rows, tuple(columns), True, (columns[-2], columns[-1]),
-        'Root mean square errors, driven by the commands alone. The nominal model is not fitted; '
-        'the others are fitted to the other half of the data.')]
 
 
 def _parameters(case: Case) -> list[ParameterRow]:

@@ -165,6 +165,8 @@ class Diagnosis:
         What streams say of each other where they contradict, without a model.
     fits : bool
         Whether the model is one of this robot at all.
+    nominal, held_out_nominal : mapping of str to float
+        Errors of the model as it was given, on all data and on those held out.
     """
 
     verdict: Verdict
@@ -184,6 +186,8 @@ class Diagnosis:
     features: Mapping[str, float] = field(default_factory=dict)
     sensors: tuple[str, ...] = ()
     fits: bool = True
+    nominal: Mapping[str, float] = field(default_factory=dict)
+    held_out_nominal: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def misfit(self) -> str:
@@ -191,6 +195,12 @@ class Diagnosis:
         stream = bool(self.findings) and self.findings[0].subsystem == Subsystem.SENSOR.value
         return ('A stream of these recordings cannot be right' if stream
                 else 'This model does not fit this robot')
+
+    @property
+    def added(self) -> bool:
+        """Whether ``model.yaml`` has something of a finding that ``plain.yaml`` lacks."""
+        return bool(self.findings) and (self.model.structure, self.model.parameters) != (
+            self.plain_model.structure, self.plain_model.parameters)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -283,8 +293,10 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
              'strength_sigma': _number(m.strength), 'subsystem': m.subsystem}
             for m in diagnosis.mismatch],
         'recalibration': [_estimate_data(e) for e in diagnosis.recalibration],
-        'fit': {'plain': _errors(diagnosis.plain), 'augmented': _errors(diagnosis.augmented),
-                'held_out': {'plain': _errors(diagnosis.held_out_plain),
+        'fit': {'nominal': _errors(diagnosis.nominal),
+                'plain': _errors(diagnosis.plain), 'augmented': _errors(diagnosis.augmented),
+                'held_out': {'nominal': _errors(diagnosis.held_out_nominal),
+                             'plain': _errors(diagnosis.held_out_plain),
                              'augmented': _errors(diagnosis.held_out_augmented)}},
         'remaining': diagnosis.remaining,
         'sensors': list(diagnosis.sensors),

@@ -149,6 +149,11 @@ class Drive:
         """Name of how much later than in other recordings commands act in that of this drive."""
         return f'lag {self.recording}'
 
+    @cached_property
+    def wheel_period(self) -> float:
+        """Usual time between two readings of the wheels [s]."""
+        return float(np.median(np.diff(self.wheel_times))) if self.wheel_times.size > 1 else 0.0
+
     def slice_of(self, channel: Channel) -> slice:
         """Return where a channel's readings stand; empty where there are none."""
         return self._slices[int(channel)]

@@ -63,7 +63,7 @@ def frame_of(drive: Drive, plant: Plant, motion: Motion, predicted: FloatArray,
         How much earlier or later than on the mean a command may come [s].
     """
     times = np.array(drive.times)
-    lag = wheel_lag(reading)
+    lag = wheel_lag(reading, drive.wheel_period)
     is_wheel = drive.channels <= int(Channel.WHEEL_RIGHT)
     times[is_wheel] -= lag
     np.clip(times, drive.start, None, out=times)

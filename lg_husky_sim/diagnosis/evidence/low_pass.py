@@ -1,13 +1,16 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A first-order low pass of a rate that is known with its integral.
+First-order low passes of a rate: one that is known with its integral, and one of messages.
 
 Between two times the rate is the parabola that has its values at both and the integral between
 them, and the filter answers a parabola in closed form::
 
     y' = (c0 + c1 s + c2 s^2 - y) / T
     y(s) = c0 + c1 (s - T) + c2 (s^2 - 2 T s + 2 T^2) + (y(0) - c0 + c1 T - 2 c2 T^2) e^(-s / T)
+
+A driver that filters what it is about to send follows its messages x_k instead, each with the same
+share of its last answer: ``y_k = share y_(k-1) + (1 - share) x_k``.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from scipy.signal import lfilter
 
 
 @jit
@@ -64,3 +68,24 @@ def low_passed(times: FloatArray, rates: FloatArray, turned: FloatArray, lag: fl
     _follow(np.ascontiguousarray(times), np.ascontiguousarray(rates),
             np.ascontiguousarray(turned), lag, setting('filter_shortest'), out)
     return out
+
+
+def followed_by_message(values: FloatArray, share: float) -> FloatArray:
+    """
+    Return messages behind a first-order filter of them.
+
+    Parameters
+    ----------
+    values : numpy.ndarray, shape (n,)
+        The filter begins at rest at the first.
+    share : float
+        Of its last answer in the next one, from 0 to below 1 [1].
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+    """
+    if share <= 0.0 or not values.size:
+        return values
+    found: FloatArray = lfilter([1.0 - share], [1.0, -share], values, zi=[share * values[0]])[0]
+    return found

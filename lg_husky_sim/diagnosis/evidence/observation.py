@@ -5,7 +5,9 @@ What the sensors of a drive would have read of a simulated motion.
 
 Places are led along the measured heading: an error of the simulated heading would otherwise turn
 the whole way behind it, and a residual of place is meant to tell of speed. Wheel rates are
-differences of angles over the time in which an encoder counts, or followed by a low pass.
+differences of angles over the time in which an encoder counts, or followed by a low pass, or both:
+a mean over W behind a low pass y of a time constant T is the difference over W of the angle's, and
+that of an angle a is ``a - T y``.
 """
 
 from __future__ import annotations
@@ -16,8 +18,8 @@ from hashlib import blake2b
 import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
-from lg_husky_sim.diagnosis.evidence.low_pass import low_passed
-from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
+from lg_husky_sim.diagnosis.evidence.low_pass import followed_by_message, low_passed
+from lg_husky_sim.diagnosis.evidence.reading import Reading, smoothing_share, WheelReading
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant, SensorModel
 from lg_husky_sim.signals import FloatArray, TimeSeries
@@ -122,7 +124,8 @@ def _wanted(drive: Drive, reading: Reading, delays: tuple[float, ...], probe: bo
         begins = wheels[:0]
     elif reading.wheels is WheelReading.FILTERED:
         begins = wheels[:0]
-        ends = _nodes(drive, wheels, acting)
+        mean = reading.get('wheel_mean')
+        ends = _nodes(drive, np.concatenate([wheels, wheels - mean]) if mean else wheels, acting)
     else:
         ends = wheels + {WheelReading.WINDOW_END: 0.0, WheelReading.WINDOW_MIDDLE: 0.5,
                          WheelReading.WINDOW_START: 1.0}[reading.wheels] * window
@@ -198,7 +201,8 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
               sensors.delay_imu + reading.get('delay_imu'),
               sensors.delay_pose + reading.get('delay_pose'))
     # A low pass follows the motion wherever its time constant.
-    window = reading.get('wheel_window') if reading.wheels is not WheelReading.FILTERED else 0.0
+    window = reading.get('wheel_mean' if reading.wheels is WheelReading.FILTERED
+                         else 'wheel_window')
     imu_window = reading.values.get('imu_window') if reading.imu != math.inf else 0.0
     key = (reading.wheels, reading.imu, window, imu_window, command_lag(drive, reading), delays,
            probe)
@@ -253,18 +257,24 @@ def _signature(plant: Plant) -> bytes:
 def _rate(motion: Motion, drive: Drive, side: str, reading: Reading, late: float) -> FloatArray:
     if reading.wheels is WheelReading.FILTERED:
         return _followed(motion, f'wheel_{side}', f'angle_{side}', 'wheels',
-                         drive.wheel_times - late, reading.get('wheel_window'))
+                         drive.wheel_times - late, reading.get('wheel_window'),
+                         reading.get('wheel_mean'))
     turned = motion.column(f'angle_{side}', 'wheels') - motion.column(f'angle_{side}', 'begins')
-    return _mean_rate(turned, motion.wanted.spans, motion.column(f'wheel_{side}', 'wheels'))
+    means = _mean_rate(turned, motion.wanted.spans, motion.column(f'wheel_{side}', 'wheels'))
+    return followed_by_message(means, smoothing_share(reading, drive.wheel_period))
 
 
-def _followed(motion: Motion, rate: str, turned: str, part: str, stamps: FloatArray, lag: float
-              ) -> FloatArray:
-    # Behind a low pass.
-    times = motion.times[motion.wanted.parts[part]]
-    followed = low_passed(times, motion.column(rate, part), motion.column(turned, part),
-                          max(lag, 1e-6))
-    found: FloatArray = followed[np.searchsorted(times, np.maximum(stamps, times[0]))]
+def _followed(motion: Motion, rate: str, turned: str, part: str, stamps: FloatArray, lag: float,
+              mean: float = 0.0) -> FloatArray:
+    # Behind a low pass, of the moment or over the mean of a window.
+    times, angles = motion.times[motion.wanted.parts[part]], motion.column(turned, part)
+    followed = low_passed(times, motion.column(rate, part), angles, max(lag, 1e-6))
+    ends = np.searchsorted(times, np.maximum(stamps, times[0]))
+    found: FloatArray = followed[ends]
+    if mean:
+        begins = np.searchsorted(times, np.maximum(stamps - mean, times[0]))
+        behind = angles - lag * followed
+        found = _mean_rate(behind[ends] - behind[begins], times[ends] - times[begins], found)
     return found
 
 

@@ -34,6 +34,9 @@ class Reading:
         for a rate of the moment, infinite for one behind a first-order low pass.
     values : mapping of str to float
         ``wheel_window`` [s] (length of the window, or time constant of the low pass),
+        ``wheel_mean`` [s] (window of the mean that goes through the low pass, zero for a rate of
+        the moment), ``wheel_smoothing`` [s] (time constant of a first-order filter of the means
+        from message to message, zero for none),
         ``imu_window`` [s] (the same of a yaw rate; its period if not given),
         ``delay_wheels``, ``delay_imu``, ``delay_pose`` [s] (how late stamps are),
         ``command_delay`` [s] (how late the base applies commands), :attr:`Drive.late` and
@@ -58,12 +61,21 @@ class Reading:
         return replace(self, values={**self.values, **values})
 
 
-def wheel_lag(reading: Reading) -> float:
+def smoothing_share(reading: Reading, period: float) -> float:
+    """Return what a filter of messages keeps of its last value: ``exp(-period / T)`` [1]."""
+    lag = reading.get('wheel_smoothing')
+    return math.exp(-period / lag) if lag > 0.0 else 0.0
+
+
+def wheel_lag(reading: Reading, period: float) -> float:
     """Return how long before its stamp a wheel rate was true, on the mean [s]."""
     window = reading.get('wheel_window')
+    if reading.wheels is WheelReading.FILTERED:
+        return reading.get('delay_wheels') + window + 0.5 * reading.get('wheel_mean')
     share = {WheelReading.WINDOW_END: 0.5, WheelReading.WINDOW_MIDDLE: 0.0,
-             WheelReading.WINDOW_START: -0.5, WheelReading.FILTERED: 1.0}[reading.wheels]
-    return reading.get('delay_wheels') + share * window
+             WheelReading.WINDOW_START: -0.5}[reading.wheels]
+    kept = smoothing_share(reading, period)
+    return reading.get('delay_wheels') + share * window + kept / (1.0 - kept) * period
 
 
 def imu_lag(reading: Reading, period: float) -> float:

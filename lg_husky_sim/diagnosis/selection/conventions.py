@@ -4,8 +4,8 @@
 How a log was made, found by the likelihood of the recalibrated model.
 
 Wheel rates may be of the moment, means over a window with the stamp at its end, middle or begin,
-or low-passed; so may a yaw rate. An offset of the stamps that comes with the smoothing of its
-window is a convention, one without is late.
+low-passed, or both; so may a yaw rate be, but not both. An offset of the stamps that comes with
+the smoothing of its window is a convention, one without is late.
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.products import normal_matrix
 from lg_husky_sim.diagnosis.evidence.reading import imu_lag, Reading, wheel_lag, WheelReading
-from lg_husky_sim.diagnosis.evidence.unknowns import window_unknown
+from lg_husky_sim.diagnosis.evidence.unknowns import start_of, Unknown, window_unknown
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+
+_WINDOWS = ('wheel_window', 'wheel_mean', 'wheel_smoothing', 'imu_window')
 
 
 def best_reading(evidence: Evidence, fit: Fit, afresh: bool = False) -> Fit:
@@ -48,13 +50,12 @@ def best_reading(evidence: Evidence, fit: Fit, afresh: bool = False) -> Fit:
     Fit
         With that reading, under the same noise; the given one where none is better.
     """
-    chosen = _better(evidence, fit, 'wheel_window', _wheel_options, afresh)
-    return _better(evidence, chosen, 'imu_window', _imu_options)
+    chosen = _better(evidence, fit, _wheel_options, afresh)
+    return _better(evidence, chosen, _imu_options)
 
 
-def _better(evidence: Evidence, fit: Fit, window: str,
-            options_of: Callable[[Evidence, Reading], Sequence[Reading]],
-            afresh: bool = False) -> Fit:
+def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
+        Evidence, Reading], Sequence[Reading]], afresh: bool = False) -> Fit:
     options = options_of(evidence, fit.point.reading)
     if not options:
         return fit
@@ -79,15 +80,30 @@ def _better(evidence: Evidence, fit: Fit, window: str,
     same = min(fit, evidence.fit(fit.point, rounds=rounds), key=lambda one: one.cost)
     if best.cost > same.cost - setting('reading_gain'):
         return fit if same.cost > fit.cost - setting('reading_gain') else same
-    unknown = window_unknown(window, best.point.log.values.get(window, 0.0) or setting(
-        'shortest_window'), _longest(best.point.reading.imu, _imu_period(evidence)))
-    if best.point.reading.imu is None or any(u.name == window for u in best.point.unknowns):
-        return evidence.fit(best.point, best.slopes, rounds=3)
     # The length of a window that was not read before is one more number.
-    wider = replace(best.point, unknowns=(*best.point.unknowns, unknown),
-                    places=np.append(best.point.places, unknown.centre))
-    slopes = [np.hstack([one, np.zeros((one.shape[0], 1))]) for one in best.slopes]
-    return evidence.fit(wider, slopes, rounds=3, renew=[len(wider.unknowns) - 1])
+    more = _unread(evidence, best.point)
+    if not more:
+        return evidence.fit(best.point, best.slopes, rounds=3)
+    known = len(best.point.unknowns)
+    wider = replace(best.point, unknowns=(*best.point.unknowns, *more),
+                    places=np.append(best.point.places, start_of(more)))
+    slopes = [np.hstack([one, np.zeros((one.shape[0], len(more)))]) for one in best.slopes]
+    return evidence.fit(wider, slopes, rounds=3, renew=range(known, known + len(more)))
+
+
+def _unread(evidence: Evidence, point: Point) -> list[Unknown]:
+    # Windows of a reading that are not estimated yet.
+    reading = point.reading
+    longest = {}
+    if reading.imu is not None:
+        longest['imu_window'] = _longest(reading.imu, _imu_period(evidence))
+    filtered = reading.wheels is WheelReading.FILTERED
+    for name in ('wheel_mean',) if filtered else ('wheel_smoothing',):
+        if reading.get(name):
+            longest[name] = setting('longest_window')
+    known = {u.name for u in point.unknowns}
+    return [window_unknown(name, point.log.values.get(name) or setting('shortest_window'), most)
+            for name, most in longest.items() if name not in known]
 
 
 def as_late(evidence: Evidence, point: Point, name: str, more: float) -> list[Point]:
@@ -109,10 +125,10 @@ def as_late(evidence: Evidence, point: Point, name: str, more: float) -> list[Po
         One for each place of the stamps in the windows of the rates, as long as they are, where
         the stamps need not be off by more than they may be.
     """
-    now, period = point.log, _imu_period(evidence)
+    now, period, wheels = point.log, _imu_period(evidence), _wheel_period(evidence)
     lag_of: Callable[[Reading], float] = {
-        'delay_wheels': wheel_lag, 'delay_imu': lambda one: imu_lag(one, period)}.get(
-            name, lambda one: 0.0)
+        'delay_wheels': lambda one: wheel_lag(one, wheels),
+        'delay_imu': lambda one: imu_lag(one, period)}.get(name, lambda one: 0.0)
     others = [replace(now, wheels=kind) for kind in WheelReading] if name == 'delay_wheels' else [
         replace(now, imu=place) for place in (0.0, 0.5, 1.0)] if (
             name == 'delay_imu' and now.imu is not None) else []
@@ -145,12 +161,12 @@ def _read_so(evidence: Evidence, point: Point, reading: Reading) -> Point:
     # With as late a stream on the whole as before: what the reading is late, its stamps are not.
     now = point.log
     other = replace(reading, values={**now.values, **reading.values})
-    period = _imu_period(evidence)
-    spared = {'delay_wheels': wheel_lag(now) - wheel_lag(other),
+    period, wheels = _imu_period(evidence), _wheel_period(evidence)
+    spared = {'delay_wheels': wheel_lag(now, wheels) - wheel_lag(other, wheels),
               'delay_imu': imu_lag(now, period) - imu_lag(other, period)}
     places = np.array([
-        place if u.kind != 'log' else u.place(reading.values[u.name]) if u.name in (
-            'wheel_window', 'imu_window') and u.name in reading.values
+        place if u.kind != 'log' else u.place(reading.values[u.name]) if u.name in _WINDOWS and (
+            u.name in reading.values)
         else place + spared.get(u.name, 0.0)
         for u, place in zip(point.unknowns, point.places, strict=True)])
     return replace(point, reading=reading).at(places)
@@ -158,6 +174,11 @@ def _read_so(evidence: Evidence, point: Point, reading: Reading) -> Point:
 
 def _imu_period(evidence: Evidence) -> float:
     return _period([d.imu_times for d in evidence.drives if d.imu_times.size > 3] or [np.zeros(2)])
+
+
+def _wheel_period(evidence: Evidence) -> float:
+    return _period([d.wheel_times for d in evidence.drives if d.wheel_times.size > 3]
+                   or [np.zeros(2)])
 
 
 def _period(times: Sequence[FloatArray]) -> float:
@@ -169,13 +190,23 @@ def _wheel_options(evidence: Evidence, now: Reading) -> list[Reading]:
     if not times:
         return []
     longest = setting('longest_window')
-    windows = sorted({w for w in (0.005, 0.01, 0.04, 0.08, longest, round(_period(times), 4))
-                      if w <= longest})
-    found = [replace(now, wheels=WheelReading.WINDOW_END).replacing(
-        {'wheel_window': setting('shortest_window')})]
-    for window in windows:
-        found += [replace(now, wheels=kind).replacing({'wheel_window': window})
-                  for kind in WheelReading]
+    period = round(_period(times), 4)
+    windows = sorted({w for w in (0.005, 0.01, 0.04, 0.08, longest, period) if w <= longest})
+    shortest = setting('shortest_window')
+
+    def read(kind: WheelReading, window: float, mean: float = 0.0, smoothing: float = 0.0
+             ) -> Reading:
+        return replace(now, wheels=kind).replacing({
+            'wheel_window': window, 'wheel_mean': mean, 'wheel_smoothing': smoothing})
+    found = [read(WheelReading.WINDOW_END, shortest)]
+    found += [read(kind, window) for window in windows for kind in WheelReading]
+    # Means behind a low pass: of the encoder's computer, or of what is sent.
+    for window in sorted({0.01, min(period, longest), 0.08}):
+        found += [read(WheelReading.FILTERED, lag, mean=window) for lag in (0.01, 0.04)]
+    for kind, window in ((WheelReading.WINDOW_END, shortest), (WheelReading.WINDOW_END, period),
+                         (WheelReading.WINDOW_MIDDLE, period), (WheelReading.WINDOW_END, 0.08)):
+        found += [read(kind, min(window, longest), smoothing=lag)
+                  for lag in (0.5 * period, 1.5 * period) if lag <= longest]
     return found
 
 

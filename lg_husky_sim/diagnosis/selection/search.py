@@ -193,7 +193,8 @@ def _settled(evidence: Evidence, point: Point, first: Evidence) -> tuple[Evidenc
 
 def as_usual(point: Point) -> Point:
     """Return a point with its effects and the robot's numbers, of a log made as most are."""
-    kept = [place for place, u in enumerate(point.unknowns) if u.name != 'imu_window']
+    kept = [place for place, u in enumerate(point.unknowns) if u.name not in (
+        'imu_window', 'wheel_mean', 'wheel_smoothing')]
     unknowns = tuple(point.unknowns[place] for place in kept)
     unknowns = loosened(unknowns, {u.name: 0.0 for u in unknowns if u.room})
     centres = start_of(unknowns)
