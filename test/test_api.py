@@ -45,7 +45,8 @@ def test_each_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.Monke
     found = names['found']
     assert [(one.effect, one.side) for one in found.findings] == [('coulomb_drivetrain', 'left')]
     errors = found.errors()
-    assert errors.columns == ('held-out error', 'nominal', 'recalibrated', 'with finding')
+    assert errors.columns == (
+        'held-out data', 'nominal', 'recalibrated', 'with finding', 'change')
     position = errors.rows[0]
     assert position[0] == 'position [m]'
     assert position[1:3] > (0.1, 0.1) > position[3:]

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 import tempfile
@@ -103,20 +103,32 @@ class DiagnosisResult:
         return Table('', ('effect', 'side', 'parameter', 'value', 'low', 'high', 'unit'),
                      tuple(rows))
 
-    def errors(self) -> Table:
-        """Return the errors on held-out data: nominal, recalibrated, with the finding."""
-        from lg_husky_sim.diagnosis.held_out import errors, split
-        from lg_husky_sim.reporting.data import NOMINAL, RECALIBRATED, WITH_FINDING
-        from lg_husky_sim.reporting.words import quantity_with_unit
+    def errors(self, held_out: bool = True) -> Table:
+        """
+        Return the errors of each model: nominal, recalibrated, with the finding.
 
-        answer = self.diagnosis
-        known = {NOMINAL: errors(self.before.plant, split(self.case.segments)[1]),
-                 RECALIBRATED: answer.held_out_plain, WITH_FINDING: answer.held_out_augmented}
-        if answer.model == answer.plain_model:
-            del known[WITH_FINDING]
-        return Table('', ('held-out error', *known), tuple(
-            (quantity_with_unit(key), *(column.get(key) for column in known.values()))
-            for key in answer.held_out_plain))
+        Parameters
+        ----------
+        held_out : bool
+            On data that were not fitted, or on all data.
+
+        Returns
+        -------
+        Table
+            The last column has the change to the last model, marked as better or worse.
+        """
+        from lg_husky_sim.diagnosis.error_tables import error_tables
+        from lg_husky_sim.reporting.page import change_words, error_cells
+        from lg_husky_sim.reporting.sections import Cell
+
+        for table in error_tables(self.diagnosis, bool(self.baseline)):
+            if table.held_out == held_out:
+                changes = [row[-1] for row in error_cells(table).rows]
+                return Table('', (table.title.lower(), *table.columns, 'change'), tuple(
+                    (row.name, *(row.values.get(name) for name in table.columns),
+                     change_words(one) if isinstance(one, Cell) else one)
+                    for row, one in zip(table.rows, changes, strict=True)))
+        return Table('', (), ())
 
     def _advice(self) -> dict[str, tuple[str, ...]]:
         from lg_husky_sim.diagnosis.report import advice
@@ -205,8 +217,9 @@ class DiagnosisResult:
         return page_part(
             self.headline, [f'Confidence {self.confidence:.2f}',
                             *(finding.statement for finding in self.findings)],
-            [self.table(), self.errors()], {'Warnings': self.diagnosis.warnings, **self._advice(),
-                                            'Notes': self.diagnosis.notes})
+            [self.table(), self.errors(), self.errors(held_out=False)],
+            {'Warnings': self.diagnosis.warnings, **self._advice(),
+             'Notes': self.diagnosis.notes})
 
 
 def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),
@@ -215,6 +228,7 @@ def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),
     """Say which physics a model lacks; see :meth:`lg_husky_sim.Husky.diagnose`."""
     from lg_husky_sim.diagnosis.before_after.diagnose_change import change_case
     from lg_husky_sim.diagnosis.diagnose import diagnose as run
+    from lg_husky_sim.diagnosis.error_tables import with_nominal
 
     recordings, baseline = given(recordings), listed(baseline)
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
@@ -224,4 +238,5 @@ def diagnose(husky: Husky, recordings: Recordings, *, baseline: Recordings = (),
         before = read_all(baseline, topics=topics, progress=lambda stage, _: report(stage, 0.0))
         case = change_case(after, before, husky.model, report, jobs=jobs) if before else run(
             after, husky.model, report, jobs=jobs)
+        case = replace(case, diagnosis=with_nominal(case.diagnosis, case.nominal, case.segments))
     return DiagnosisResult(case, tuple(after), husky, tuple(before))

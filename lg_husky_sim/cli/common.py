@@ -91,8 +91,8 @@ class Output:
             from lg_husky_sim.cli.terminal import print_table
             print_table(text, _console())
         elif sys.stdout.isatty():
-            from rich.text import Text
-            _console().print(Text(str(text)), soft_wrap=True)
+            from lg_husky_sim.cli.terminal import marked
+            _console().print(marked(str(text)), soft_wrap=True)
         else:
             click.echo(str(text))
 

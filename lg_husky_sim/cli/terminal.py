@@ -50,6 +50,17 @@ def print_table(table: Table, console: Any) -> None:
     console.print(grid)
 
 
+def marked(text: str) -> Any:
+    """Return a text for a console with its warnings, and gains and losses of tables, coloured."""
+    from rich.text import Text
+
+    shown = Text(text)
+    shown.highlight_regex(r'(?m)^ *warning:', 'bold red')
+    shown.highlight_regex(r'(?m)\S+(?:\s%)? worse$', 'bold red')
+    shown.highlight_regex(r'(?m)\S+(?:\s%)? better$', 'bold green')
+    return shown
+
+
 def _parts(text: str) -> list[str]:
     """Return what is not broken, spaces left as they are: words, and the names in a topic."""
     return re.findall(r'\s*/[^\s/]*|\s*\S+' if text.startswith('/') else r'\s*\S+', text) or ['']

@@ -116,6 +116,11 @@ def _change_cell(known: Mapping[str, float], compared: tuple[str, str], low: flo
     return Cell(words, tone=Tone.GOOD if after < before else Tone.PLAIN)
 
 
+def change_words(cell: Cell) -> str:
+    """Return what a cell says where there are no colours: a gain is marked as a loss is."""
+    return f'{cell.text} better' if cell.tone is Tone.GOOD else cell.text
+
+
 def parameter_rows(rows: Sequence[ParameterRow]) -> list[dict[str, Any]]:
     """Return the table of parameters: numbers as text, and places within what the fit allows."""
     return [_parameter(one) for one in rows]
