@@ -25,8 +25,6 @@ from lg_husky_sim.reporting.write import write_report
 
 #: File that marks a folder of this kind.
 MARKER = 'diagnosis.json'
-#: Width of the names of errors, and of the numbers of a model.
-NAMES, NUMBERS = 25, 13
 
 
 def headline(diagnosis: Diagnosis, changed: bool = False) -> str:
@@ -85,18 +83,19 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
 
 
 def _error_lines(tables: Sequence[ErrorTable]) -> list[str]:
-    # The cells of the page, whose colours are words here; one head for tables of like columns.
-    lines: list[str] = []
-    for table in tables:
-        shown = error_cells(table)
-        lines.append(f'  {table.title.lower():{NAMES}}' + ''.join(
-            f'{name:>{NUMBERS}}' for name in shown.head[1:]))
-        for label, *cells in shown.rows:
-            lines.append(f'  {label!s:{NAMES}}' + ''.join(
-                f'{change_words(one) if isinstance(one, Cell) else one:>{NUMBERS}}'
-                for one in cells).rstrip())
-    return [*lines, f'  change: from {tables[0].columns[-2]} to {tables[0].columns[-1]}'] if (
-        lines) else []
+    # The cells of the page, whose colours are words here; all tables have one set of columns.
+    if not tables:
+        return []
+    shown = [(table.title.lower(), error_cells(table)) for table in tables]
+    rows = [[title, *one.head[1:]] if row is None else [
+        change_words(cell) if isinstance(cell, Cell) else cell for cell in row]
+        for title, one in shown for row in (None, *one.rows)]
+    first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
+    lines = [f'  {name:{first}}' + ''.join(
+        f'  {text:>{width}}' for text, width in zip(texts, others, strict=True))
+        for name, *texts in rows]
+    before, after = tables[0].columns[-2:]
+    return [*lines, f'  change: from {before} to {after}']
 
 
 def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,
