@@ -254,8 +254,7 @@ def explained_by(search: Search) -> float:
     -------
     float
         What they gain under the noise that remains with them [nats], over the robot as it may be:
-        its numbers stay within the tolerances beyond which a report says so, where they would do
-        the effect's work.
+        its numbers stay within `most_tolerances` where they would do the effect's work.
     """
     evidence, plain = search.evidence, search.plain.point
     room = setting('most_tolerances')

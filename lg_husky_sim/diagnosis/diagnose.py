@@ -44,6 +44,7 @@ from lg_husky_sim.diagnosis.sensors.repair import (
 )
 from lg_husky_sim.diagnosis.sensors.robot import differences, impossible, misread
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.diagnosis.strain import strained
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter, Parameters
@@ -191,7 +192,8 @@ def _diagnosis(found: Search, left: Search, rest: Sequence[Effort], free: Sequen
         model_of(found.final, found.evidence, nominal, f'{about} {nearest}'.rstrip()),
         model_of(found.plain, found.evidence, nominal, 'recalibrated, nothing added'),
         (*((nearest,) if nearest else ()), *_notes(found, plain_out, augmented_out)),
-        asdict(said.features))
+        asdict(said.features), strained_plain=strained(found.plain),
+        strained=strained(found.final))
     return diagnosis, said.features
 
 
@@ -257,12 +259,6 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
         notes.append('held-out errors of rates that grow are those of the rates themselves, not '
                      'of what this log makes of them (below), which numbers of the '
                      'recalibrated model may stand for')
-    most = setting('most_tolerances')
-    moved = [u.name for u, s in zip(found.final.point.unknowns, found.final.point.prior_residuals,
-                                    strict=True) if abs(s) > most and u.kind == 'model']
-    if moved:
-        notes.append(f'recalibrated by more than {most:g} tolerances: ' + ', '.join(moved)
-                     + '; check that the model is one of this robot')
     notes += log_notes(found.evidence.drives)
     notes += made
     values = found.evidence.noise.values

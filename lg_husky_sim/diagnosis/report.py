@@ -36,7 +36,6 @@ from lg_husky_sim.reporting.sections import Cell, Section, Table, Tone
 from lg_husky_sim.reporting.words import (
     capitalised,
     number,
-    plural,
     with_interval,
     with_unit,
 )
@@ -153,16 +152,6 @@ def _facts(finding: Finding, several: bool, changed: bool) -> tuple[tuple[str, s
             # More than two numbers are read better in the sentence than in a small box.
             *((('Size', words),) if len(sizes) <= 2 else ()),
             ('Acts', _acts(finding, changed)))
-
-
-def implausible(rows: Sequence[ParameterRow]) -> tuple[str, ...]:
-    """Return a warning where parameters of the recalibration end at what it may use up."""
-    bound = [one.name.replace('_', ' ') for one in rows if one.at_bound]
-    return () if not bound else (
-        f'{len(bound)} of {plural(len(rows), "recalibrated parameter")} '
-        f'{"is at its bound" if len(bound) == 1 else "are at their bounds"} '
-        f'({", ".join(bound)}): the recalibration is implausible there, and what it could not '
-        'absorb may have ended up in the finding.',)
 
 
 def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str], *,
@@ -376,8 +365,7 @@ def report_data(
                for text in unexplained_sensors(diagnosis)),
              *diagnosis.notes,
              *((f'what remains: {remains}',) if remains else ()))
-    warnings = (*(f'{capitalised(text)}.' for text in diagnosis.warnings),
-                *(implausible(parameters) if diagnosis.fits else ()))
+    warnings = tuple(f'{capitalised(text)}.' for text in diagnosis.warnings)
     return ReportData(
         f'{"What changed in " if changed else "Diagnosis of "}{", ".join(recordings)}',
         headline(diagnosis, warnings, changed=changed), columns,

@@ -11,6 +11,7 @@ import math
 from typing import Any
 
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.diagnosis.strain import implausible_words, Strained
 from lg_husky_sim.husky.effects import Onset, OnsetKind, Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.reporting.words import quantity_with_unit
@@ -167,6 +168,9 @@ class Diagnosis:
         Whether the model is one of this robot at all.
     nominal, held_out_nominal : mapping of str to float
         Errors of the model as it was given, on all data and on those held out.
+    strained_plain, strained : tuple of Strained
+        Parameters that are beyond their tolerances, in the recalibrated model and in the one
+        with what was found.
     """
 
     verdict: Verdict
@@ -188,6 +192,8 @@ class Diagnosis:
     fits: bool = True
     nominal: Mapping[str, float] = field(default_factory=dict)
     held_out_nominal: Mapping[str, float] = field(default_factory=dict)
+    strained_plain: tuple[Strained, ...] = ()
+    strained: tuple[Strained, ...] = ()
 
     @property
     def misfit(self) -> str:
@@ -204,7 +210,11 @@ class Diagnosis:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the model with the finding predicts worse on held-out data; one or none."""
+        """What speaks against the answer: held-out losses, parameters that are implausible."""
+        return (*self._losses(), *(implausible_words(
+            self.strained_plain, self.strained, self.added) if self.fits else ()))
+
+    def _losses(self) -> tuple[str, ...]:
         before, after = self.held_out_plain, self.held_out_augmented
         worse = [f'{quantity_with_unit(name)} from {value:.3g} to {after[name]:.3g}'
                  for name, value in before.items() if name in grown(before, after)]
@@ -292,6 +302,8 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
             {'recording': m.recording, 'channel': m.channel, 'start_s': m.start, 'end_s': m.end,
              'strength_sigma': _number(m.strength), 'subsystem': m.subsystem}
             for m in diagnosis.mismatch],
+        'implausible': {'plain': [one.data() for one in diagnosis.strained_plain],
+                        'augmented': [one.data() for one in diagnosis.strained]},
         'recalibration': [_estimate_data(e) for e in diagnosis.recalibration],
         'fit': {'nominal': _errors(diagnosis.nominal),
                 'plain': _errors(diagnosis.plain), 'augmented': _errors(diagnosis.augmented),

@@ -11,7 +11,7 @@ from lg_husky_sim.diagnosis.before_after.settings import Change, settings
 from lg_husky_sim.diagnosis.commercial_base import CommercialBase
 from lg_husky_sim.diagnosis.model_mismatch import _said
 from lg_husky_sim.diagnosis.output import summary_text
-from lg_husky_sim.diagnosis.report import advice, competing, headline, implausible, report_data
+from lg_husky_sim.diagnosis.report import advice, competing, headline, report_data
 from lg_husky_sim.diagnosis.result import (
     Diagnosis,
     diagnosis_data,
@@ -25,9 +25,6 @@ from lg_husky_sim.diagnosis.wording import number_words, sentence, sized
 from lg_husky_sim.husky.effects import catalogue, Effect
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.reporting.advice import names_in
-from lg_husky_sim.reporting.data import (
-    ParameterRow,
-)
 from lg_husky_sim.reporting.sections import Cell, Tone
 import pytest
 
@@ -248,15 +245,6 @@ def test_what_gets_worse_on_held_out_data_is_said_first_everywhere() -> None:
     page = report_data(worse, ['rec'], [], [])
     assert page.headline.warnings == (f'O{warning[1:]}.',)
     assert replace(worse, held_out_augmented=worse.held_out_plain).warnings == ()
-
-
-def test_parameters_at_their_bounds_are_called_implausible() -> None:
-    rows = [ParameterRow('wheel_damping', 'N·m·s/rad', 1.0, 2.0, at_bound=True),
-            ParameterRow('mass', 'kg', 48.0, 50.0)]
-    (warning,) = implausible(rows)
-    assert warning.startswith(
-        '1 of 2 recalibrated parameters is at its bound (wheel damping): the recalibration is')
-    assert implausible(rows[1:]) == ()
 
 
 def test_reports_call_effects_and_numbers_by_names_of_the_field() -> None:
