@@ -198,13 +198,7 @@ class Plant:
         """
         if self.onset is None:
             return np.zeros(times.size, dtype=bool)
-        match self.onset.kind:
-            case OnsetKind.TIME:
-                return times >= self.onset.value
-            case OnsetKind.PLACE_ABOVE:
-                return x >= self.onset.value
-            case OnsetKind.PLACE_BELOW:
-                return x <= self.onset.value
+        return acts(self.onset, times, x)
 
     def observe(self, truth: TimeSeries) -> TimeSeries:
         """
@@ -232,6 +226,29 @@ class Plant:
             early, later = (np.diff(one[:, place], prepend=one[0, place]) for one in seen)
             values[:, place] = seen[0][0, place] + np.cumsum(np.where(late, later, early))
         return TimeSeries(truth.times, values, truth.names)
+
+
+def acts(onset: Onset, times: FloatArray, x: FloatArray) -> np.typing.NDArray[np.bool_]:
+    """
+    Return when effects with an onset act.
+
+    Parameters
+    ----------
+    onset : Onset
+    times, x : numpy.ndarray, shape (n,)
+        On the recording's clock [s], and where the robot is then [m]; NaN if not known.
+
+    Returns
+    -------
+    numpy.ndarray of bool, shape (n,)
+    """
+    match onset.kind:
+        case OnsetKind.TIME:
+            return times >= onset.value
+        case OnsetKind.PLACE_ABOVE:
+            return x >= onset.value
+        case OnsetKind.PLACE_BELOW:
+            return x <= onset.value
 
 
 def _observed(truth: TimeSeries, sensors: SensorModel) -> FloatArray:

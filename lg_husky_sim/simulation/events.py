@@ -14,11 +14,14 @@ times, prepare those once::
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cached_property
 import math
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import BodyTwist, FloatArray, Pose, TimeSeries
+from lg_husky_sim.simulation.arrays import FROM_TIME, KIND, ONSET, Packed
 from lg_husky_sim.simulation.event_kernel import COLUMNS
 from lg_husky_sim.simulation.event_kernel import run as run_kernel
 from lg_husky_sim.simulation.initial_state import InitialStates
@@ -127,7 +130,12 @@ class Propagator:
                    np.empty((1, len(COLUMNS))), events.end, False, self.packed)
         return self._starts.run_in(flat, start)
 
-    def run(self, events: Events, initial: FloatArray, *, fine_pose: bool = True) -> FloatArray:
+    @cached_property
+    def _never_and_always(self) -> tuple[Packed, Packed]:
+        return _switched(self.packed, math.inf), _switched(self.packed, -math.inf)
+
+    def run(self, events: Events, initial: FloatArray, *, fine_pose: bool = True,
+            legs: Sequence[tuple[float, bool]] = ()) -> FloatArray:
         """
         Drive the plant from a state through all events.
 
@@ -139,6 +147,9 @@ class Propagator:
         fine_pose : bool
             Whether x and y are wanted to better than 1e-7 m; else they are arcs between the
             times, which is a little faster.
+        legs : sequence of (float, bool)
+            Until when [s] a plant's second set acts or does not, by turns, the last one without
+            end; where its own onset says if none are given.
 
         Returns
         -------
@@ -147,10 +158,23 @@ class Propagator:
         """
         flat = np.array(initial)
         flat[len(self.plant.states) + 6] = events.start
-        out = np.empty((events.times.size, len(COLUMNS)))
-        run_kernel(flat, events.stamps, events.values, events.times, events.places, out,
-                   events.end, fine_pose, self.packed)
+        out, first = np.empty((events.times.size, len(COLUMNS))), 0
+        for until, second in legs or ((math.inf, None),):
+            packed = self.packed if second is None else self._never_and_always[second]
+            last = int(np.searchsorted(events.times, until, side='right'))
+            run_kernel(flat, events.stamps, events.values, events.times[first:last],
+                       events.places[first:last], out, min(until, events.end), fine_pose, packed)
+            if until >= events.end:
+                break
+            first = last
         return out
+
+
+def _switched(packed: Packed, since: float) -> Packed:
+    # With a second set that acts from a time on, in place of its own onset.
+    stages = np.array(packed.stages)
+    stages[:, KIND], stages[:, ONSET] = FROM_TIME, since
+    return packed._replace(stages=stages)
 
 
 def run(plant: Plant, events: Events, initial: FloatArray) -> FloatArray:

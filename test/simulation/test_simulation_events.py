@@ -139,6 +139,29 @@ def test_a_place_is_found_between_the_times(robot: Maker, kind: OnsetKind) -> No
     assert not np.allclose(seen.values[-1], plain.values[-1], rtol=0, atol=1e-4)
 
 
+@pytest.mark.parametrize('effect', ['payload', 'coulomb_drivetrain'])
+def test_legs_say_when_the_second_set_acts(robot: Maker, effect: str) -> None:
+    """Beyond a place by turns: as often as the robot crosses it, whatever its onset says."""
+    commands = series([0.0, 2.0, 4.0], [[0.7, 0.1], [-0.7, 0.1], [0.7, 0.0]])
+    times, place = np.sort(np.append(np.linspace(0.0, 6.0, 301), [1.234567, 4.9])), 0.5
+    numbers = {'payload_mass': 40.0} if effect == 'payload' else {'dry_torque': 4.0}
+    plant = robot(Effect(effect, late=True), onset=Onset(OnsetKind.PLACE_ABOVE, place), **numbers)
+    seen = trajectory(plant, commands, times)
+    fine = trajectory(plant, commands, np.linspace(0.0, 6.0, 60001))
+    x = fine.column('x') - place
+    before = np.flatnonzero((x[1:] >= 0.0) != (x[:-1] >= 0.0))
+    turns = fine.times[before] - x[before] * 1e-4 / (x[before + 1] - x[before])
+    assert turns.size == 3
+    legs = [(float(end), bool(k % 2)) for k, end in enumerate([*turns, np.inf])]
+    elsewhere = Propagator(robot(Effect(effect, late=True), onset=Onset(
+        OnsetKind.PLACE_BELOW, -9.0), **numbers))
+    events = Events(commands, times)
+    told = elsewhere.run(events, elsewhere.initial(), legs=legs)
+    np.testing.assert_allclose(told, seen.values, rtol=0, atol=1e-5)
+    never = elsewhere.run(events, elsewhere.initial())
+    assert np.max(np.abs(told - never)) > 0.05
+
+
 def test_what_was_in_force_before_the_first_command_counts(robot: Maker) -> None:
     commands = series([1.0], [[0.0, 0.0]])
     driven = trajectory(robot(), commands, [0.999, 1.5], start=0.0,

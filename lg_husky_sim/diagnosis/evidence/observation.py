@@ -19,6 +19,7 @@ import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.low_pass import followed_by_message, low_passed
+from lg_husky_sim.diagnosis.evidence.measured_place import acts_at, is_measured, legs_of
 from lg_husky_sim.diagnosis.evidence.reading import Reading, smoothing_share, WheelReading
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.plant import Plant, SensorModel
@@ -85,12 +86,17 @@ class Motion:
         Columns of the kernel.
     wanted : Wanted
     plant : Plant
+    drive : Drive
+    delay : float
+        How late the stamps of its pose are [s].
     """
 
     times: FloatArray
     rows: FloatArray
     wanted: Wanted
     plant: Plant
+    drive: Drive
+    delay: float
 
     def column(self, name: str, part: str) -> FloatArray:
         """Return one column of the kernel at some of the times."""
@@ -98,6 +104,9 @@ class Motion:
 
     def late(self) -> np.typing.NDArray[np.bool_]:
         """Return where the plant's second set acts."""
+        onset = self.plant.onset
+        if onset is not None and is_measured(self.drive, onset):
+            return acts_at(self.drive, onset, self.times, self.delay)
         return self.plant.late(self.times, self.rows[:, _COLUMN['x']])
 
 
@@ -208,16 +217,17 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
            probe)
     wanted = drive.memory.remembered('wanted', key, lambda: _wanted(
         drive, reading, delays, probe))
-    rows = drive.memory.rows((key, _signature(plant)), lambda: _driven(plant, drive, wanted))
+    rows = drive.memory.rows((key, _signature(plant)), lambda: _driven(
+        plant, drive, wanted, delays[2]))
     events = wanted.events
     times = events.times
     if events.order is not None:
         times = np.empty_like(events.times)
         times[events.order] = events.times
-    return Motion(times, rows, wanted, plant)
+    return Motion(times, rows, wanted, plant, drive, delays[2])
 
 
-def _driven(plant: Plant, drive: Drive, wanted: Wanted) -> FloatArray:
+def _driven(plant: Plant, drive: Drive, wanted: Wanted, delay: float) -> FloatArray:
     # Rows of the kernel.
     kept = plant.__dict__
     # One for all drives: the modes of a plant are found once.
@@ -236,7 +246,9 @@ def _driven(plant: Plant, drive: Drive, wanted: Wanted) -> FloatArray:
         state = propagator.run_in(events, propagator.initial(
             drive.pose, twist, events.start, drive.wheel_rates, drive.wheel_angles,
             commanded_until(events.start, earlier, drive.twist, drive.wheel_rates)), state)
-    return propagator.run(wanted.events, state, fine_pose=False)
+    onset = plant.onset
+    legs = legs_of(drive, onset, delay) if onset and is_measured(drive, onset) else ()
+    return propagator.run(wanted.events, state, fine_pose=False, legs=legs)
 
 
 def _signature(plant: Plant) -> bytes:
