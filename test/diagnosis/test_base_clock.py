@@ -11,16 +11,22 @@ from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.diagnose import diagnose
 from lg_husky_sim.diagnosis.evidence import clock_search
 from lg_husky_sim.diagnosis.evidence.base_clock import ticked_as, ticker_of, ticking
-from lg_husky_sim.diagnosis.evidence.clock_search import at_ticks
+from lg_husky_sim.diagnosis.evidence.clock_search import at_ticks, usual_period
 from lg_husky_sim.diagnosis.evidence.drives import Clock, Drive, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, Noise
 from lg_husky_sim.diagnosis.evidence.point import beginning, Point
-from lg_husky_sim.diagnosis.evidence.reading import Reading
-from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns, start_of, tick_unknowns
+from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
+from lg_husky_sim.diagnosis.evidence.unknowns import (
+    base_unknowns,
+    start_of,
+    tick_unknowns,
+    window_unknown,
+)
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.selection import recalibration, search
+from lg_husky_sim.diagnosis.selection.conventions import read_like
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.diagnosis.selection.ticks import ticked, ticks_are_likelier
 from lg_husky_sim.husky.model import compile_model
@@ -69,6 +75,51 @@ def test_commands_wait_for_the_next_tick_and_the_last_one_counts() -> None:
     held = at_ticks(commands, 0.05, 0.0)
     np.testing.assert_allclose(held.times, [0.05, 0.1])
     np.testing.assert_array_equal(held.values[:, 0], [3.0, 4.0])
+
+
+def test_the_period_of_messages_is_that_of_runs_without_a_pause() -> None:
+    """A minute of 20 Hz must be known to a part of a tick, whatever the pauses are long."""
+    rng, runs, begin = np.random.default_rng(3), [], 0.0
+    for length in (400, 90, 1, 350, 2, 260):
+        runs.append(begin + 0.05 * np.arange(length) + rng.uniform(0.0, 0.012, length))
+        begin = runs[-1][-1] + rng.uniform(0.3, 1.1)
+    times = np.delete(np.concatenate(runs), [77, 300, 301, 612])
+    assert usual_period([times, times[200:700] + 9.0]) == pytest.approx(0.05, rel=1e-4)
+    assert usual_period([np.array([1.0, 3.0])]) == 2.0
+
+
+def test_ticks_are_compared_with_a_log_that_is_read_alike(
+        made: Made, pool: Threads, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wheel rates behind a low pass were held against them: only the base was read so."""
+    drives, model = drives_of([made('one', PERIOD, 1)]), load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    slow = replace(start, reading=Reading(WheelReading.FILTERED, 0.0, {
+        'wheel_window': 0.05, 'wheel_mean': 0.02, 'imu_window': 0.02}))
+    windows = [window_unknown(name, 0.02, 0.15) for name in ('wheel_mean', 'imu_window')]
+    slow = replace(slow, unknowns=(*slow.unknowns, *windows), places=np.append(
+        slow.places, start_of(windows)))
+    late = next(k for k, u in enumerate(slow.unknowns) if u.name == 'command_delay')
+    slow.places[late] += 0.004
+    effect = next(h for h in hypotheses(start.structure) if h.effect.id == 'yaw_pull')
+    heavy = effect.point(start, {'pull_moment': 2.0})
+    alike = read_like(heavy, slow)
+    assert alike.reading == slow.reading
+    assert [u.name for u in alike.unknowns[-3:]] == ['wheel_mean', 'imu_window', 'pull_moment']
+    assert alike.log.get('wheel_mean') == pytest.approx(0.02)
+    assert alike.log.get('command_delay') == start.log.get('command_delay')
+    assert alike.values == heavy.values
+    evidence = evidence_of(drives, ['one'], start, first_guess(drives), pool)
+    asked: list[list[Point]] = []
+    monkeypatch.setattr(recalibration, 'likelier_ticks',
+                        lambda first, plain, starts, rivals: asked.append(list(starts)))
+    for base in (start, slow):
+        fit = evidence.fit(base, rounds=0)
+        known = recalibration.Recalibrated(
+            evidence, fit, recalibration.Logged(fit), evidence, fit)
+        assert recalibration.at_ticks(known, start, [drives]) is None
+    assert [[one.reading for one in starts] for starts in asked] == [
+        [start.reading], [start.reading, slow.reading]]
 
 
 def test_the_period_of_a_base_is_found_from_two_drives(

@@ -88,6 +88,33 @@ def at_ticks(commands: TimeSeries, period: float, phase: float) -> TimeSeries:
     return TimeSeries(phase + period * number[last], commands.values[last], commands.names)
 
 
+def usual_period(series: Sequence[FloatArray]) -> float:
+    """
+    Return the period at which messages come that jitter, and of which some are missing.
+
+    Of each run of n messages without a pause, with stamps t_k, a straight line ``t_k = a + P k``
+    by least squares; P is common to all runs.
+
+    Parameters
+    ----------
+    series : sequence of numpy.ndarray
+        Stamps of one drive each [s], at least one of them with two or more.
+
+    Returns
+    -------
+    float
+        [s].
+    """
+    usual = float(np.median(np.concatenate([np.diff(times) for times in series])))
+    along = across = 0.0
+    for times in series:
+        for run in np.split(times, np.flatnonzero(np.abs(np.diff(times) / usual - 1.0) > 0.5) + 1):
+            number = np.arange(run.size) - 0.5 * (run.size - 1)
+            along += float(number @ run)
+            across += float(number @ number)
+    return along / across if across > 0.0 else usual
+
+
 def _promising(steps: Sequence[Steps]) -> list[float]:
     # Rates at which the spectra of delays and slopes stand out, strongest first, each with those
     # that are the same where commands change at a rate of their own [Hz].
@@ -205,11 +232,7 @@ class ClockSearch:
     def _in_step(self) -> list[float]:
         # Multiples of the rate at which commands come: their delays are all alike, or jump by a
         # whole period, and no spectrum shows it.
-        spans = [(one.commands.times, np.diff(one.commands.times))
-                 for one in self.tickers if one.commands.times.size > 1]
-        usual = float(np.median(np.concatenate([gaps for _, gaps in spans])))
-        own = (sum(float(np.sum(np.rint(gaps / usual))) for _, gaps in spans)
-               / sum(float(times[-1] - times[0]) for times, _ in spans))
+        own = 1.0 / usual_period([one.commands.times for one in self.tickers])
         fastest, slowest = 1.0 / setting('clock_shortest'), 1.0 / setting('clock_longest')
         return [own * k for k in range(1, int(fastest / own) + 1) if own * k >= slowest]
 

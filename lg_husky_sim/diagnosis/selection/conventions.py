@@ -144,6 +144,29 @@ def as_late(evidence: Evidence, point: Point, name: str, more: float) -> list[Po
     return found
 
 
+def read_like(point: Point, other: Point) -> Point:
+    """
+    Return a point that is read like another one, with what is late where it is likeliest.
+
+    Parameters
+    ----------
+    point : Point
+        With the robot's numbers and effects.
+    other : Point
+        With its reading, and how long its windows are.
+    """
+    known = {u.name: place for u, place in zip(other.unknowns, other.places, strict=True)
+             if u.name in _WINDOWS}
+    new = tuple(u for u in other.unknowns if u.name in _WINDOWS and all(
+        u.name != own.name for own in point.unknowns))
+    last = sum(u.kind == 'effect' for u in point.unknowns)
+    split = len(point.unknowns) - last
+    unknowns = (*point.unknowns[:split], *new, *point.unknowns[split:])
+    places = np.concatenate([point.places[:split], start_of(new), point.places[split:]])
+    return replace(point, reading=other.reading, unknowns=unknowns, places=np.array([
+        known.get(u.name, place) for u, place in zip(unknowns, places, strict=True)]))
+
+
 def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
     # What a fit would cost after one step from a point, with the derivatives of this one.
     def promise(point: Point) -> float:

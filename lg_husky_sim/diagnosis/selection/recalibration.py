@@ -12,7 +12,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
-from lg_husky_sim.diagnosis.selection.conventions import best_reading
+from lg_husky_sim.diagnosis.selection.conventions import best_reading, read_like
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted, Tried
 from lg_husky_sim.diagnosis.selection.screening import Look, look
@@ -122,8 +122,11 @@ def at_ticks(known: Recalibrated, start: Point, rivals: Sequence[Sequence[Drive]
         None where ticks are not likelier, or the robot's numbers are distorted with them, too: it
         lacks something else then, which the ticks may be a part of.
     """
-    # From where delays have not taken their place.
-    drives = likelier_ticks(known.first, (known.evidence, known.base), start, rivals)
+    # From where delays have not taken their place, of a log that was made as most are or like that
+    # without ticks: a low pass is not to be held against them.
+    starts = [start, read_like(start, known.base.point)]
+    drives = likelier_ticks(known.first, (known.evidence, known.base), starts[
+        :1 if known.base.point.reading == start.reading else 2], rivals)
     if drives is None:
         return None
     other = recalibrated(*ticked(known.first, start, drives))

@@ -38,7 +38,7 @@ def ticked(evidence: Evidence, point: Point, drives: Sequence[Drive]) -> tuple[E
     return evidence_of(drives, evidence.names, wider, evidence.noise, evidence.pool), wider
 
 
-def likelier_ticks(first: Evidence, plain: tuple[Evidence, Fit], start: Point,
+def likelier_ticks(first: Evidence, plain: tuple[Evidence, Fit], starts: Sequence[Point],
                    rivals: Sequence[Sequence[Drive]]) -> Sequence[Drive] | None:
     """
     Return drives with commands at the likeliest of some ticks, if these are likelier than none.
@@ -49,16 +49,17 @@ def likelier_ticks(first: Evidence, plain: tuple[Evidence, Fit], start: Point,
         Under a first guess of the noise.
     plain : tuple of Evidence and Fit
         Of commands that are applied as they come.
-    start : Point
+    starts : sequence of Point
         Where the fits begin.
     rivals : sequence of sequence of Drive
         With commands at ticks of one rate or another.
     """
     afresh = [(evidence, evidence.fit(point)) for evidence, point in (
-        ticked(first, start, drives) for drives in rivals)]
+        ticked(first, start, drives) for drives in rivals for start in starts)]
     best = min(range(len(afresh)), key=lambda k: afresh[k][1].cost)
     near = calibrated(afresh[best][0], afresh[best][1].point, 1)
-    return rivals[best] if ticks_are_likelier(plain, near, rivals[best]) else None
+    drives = rivals[best // len(starts)]
+    return drives if ticks_are_likelier(plain, near, drives) else None
 
 
 def ticks_are_likelier(plain: tuple[Evidence, Fit], ticked: tuple[Evidence, Fit],
