@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 import enum
 from functools import lru_cache
+import math
 
 from lg_husky_sim.errors import ParameterError, UnknownParameterError
 from lg_husky_sim.husky import network
@@ -153,6 +154,14 @@ def _outputs(edited: EditedNetwork) -> tuple[str, ...]:
     return (f'omega({left})', f'omega({right})', 'v(M_H)', 'omega(J_H)', 'i(L_1)', 'i(L_2)')
 
 
+def _sided(space: StateSpace, ratio: float) -> StateSpace:
+    # The same voltage does more on the left than on the right by a ratio.
+    if ratio == 1.0:
+        return space
+    sides = np.array([math.sqrt(ratio), 1.0 / math.sqrt(ratio)])
+    return replace(space, B=space.B * sides, D=space.D * sides, K=space.K * sides)
+
+
 class _Regime:
     """One network, analysed; gives a :class:`PlantSet` for numbers."""
 
@@ -177,7 +186,7 @@ class _Regime:
     def at(self, values: Mapping[str, float]) -> PlantSet:
         if self._renamed:
             values = {**values, **{name: values[own] for name, own in self._renamed.items()}}
-        space: StateSpace = self.numeric.at(values)
+        space: StateSpace = _sided(self.numeric.at(values), values['side_gain_ratio'])
         coefficients = np.zeros((self._laws.size, WIDTH))
         coefficients[:, MOTOR] = self._motors
         numbers = eval(self._code, dict(GLOBALS), values)  # noqa: S307 (our own expressions)

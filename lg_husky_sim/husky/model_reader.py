@@ -34,6 +34,9 @@ MOST_ERRORS = 20
 NOT_TOLD = 'not told'
 """Source of a parameter whose file tells none."""
 
+IMPLIED = ('side_gain_ratio',)
+"""Parameters that are the packaged robot's where a file has none: its sides are alike."""
+
 _Read = TypeVar('_Read')
 
 
@@ -192,10 +195,11 @@ def _parameters(errors: list[str], data: object, nominal: Parameters | None
     errors += [f'unknown parameter {shown(name)}{_hint(near, nominal)}'
                for name, near in meant.items()]
     errors += [f'parameter {name} is missing' for name in nominal
-               if name not in given and name not in meant.values()]
+               if name not in (*given, *IMPLIED) and name not in meant.values()]
     robot = _size(given, nominal)
     found = [_parameter(errors, name, entry, templates[name], robot)
              for name, entry in given.items() if name in templates]
+    found += [nominal.entry(name) for name in IMPLIED if name in nominal and name not in given]
     return [one for one in found if one is not None], robot
 
 

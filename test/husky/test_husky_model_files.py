@@ -311,3 +311,14 @@ def test_a_key_without_a_value_is_an_empty_text(tmp_path: Path) -> None:
     model = load_model(tmp_path / 'model.yaml')
     assert model.about == ''
     assert model.structure.onset == Onset(OnsetKind.TIME, 3.0)
+
+
+def test_a_file_need_not_say_that_both_sides_are_alike(tmp_path: Path) -> None:
+    """Files of robots from before there was a number for it are read as they are."""
+    nominal, written_before = load_model(), tmp_path / 'before.yaml'
+    data = yaml.safe_load((Path(__file__).parents[2] / 'config' / 'husky.yaml').read_text('utf-8'))
+    del data['parameters']['side_gain_ratio']
+    written_before.write_text(yaml.safe_dump(data), 'utf-8')
+    read = load_model(written_before)
+    assert read.parameters['side_gain_ratio'] == 1.0
+    assert dict(read.parameters) == dict(nominal.parameters)
