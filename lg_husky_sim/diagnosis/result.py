@@ -211,8 +211,8 @@ class Diagnosis:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What speaks against the answer: held-out losses, parameters that are implausible."""
-        return (*self._losses(), *(implausible_words(
-            self.strained_plain, self.strained, self.added) if self.fits else ()))
+        return (*self._losses(), *(
+            implausible_words(self.strained, self.added) if self.fits else ()))
 
     def _losses(self) -> tuple[str, ...]:
         before, after = self.held_out_plain, self.held_out_augmented

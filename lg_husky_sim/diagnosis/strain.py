@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.reporting.words import number
+from lg_husky_sim.reporting.words import digits_apart, number
 
 if TYPE_CHECKING:
     from lg_husky_sim.diagnosis.evidence.evidence import Fit
@@ -49,10 +49,14 @@ class Strained:
 
     @property
     def words(self) -> str:
-        """Name, factor and tolerance, such as ``wheel damping ×15 (tolerance ×0.1 to ×11)``."""
+        """Name, factor and tolerance, such as ``mass ×1.21 (tolerance ×0.907 to ×1.1)``."""
         bound = ', at its bound' if self.at_bound else ''
-        return (f'{self.name.replace("_", " ")} ×{number(self.factor, 2)} (tolerance '
-                f'×{number(self.least, 2)} to ×{number(self.most, 2)}{bound})')
+        digits = max(digits_apart(1.0, self.factor, self.factor),
+                     digits_apart(1.0, self.least, self.most))
+        factor, least, most = (number(one, digits)
+                               for one in (self.factor, self.least, self.most))
+        return (f'{self.name.replace("_", " ")} ×{factor} (tolerance ×{least} to ×{most}'
+                f'{bound})')
 
     def data(self) -> dict[str, Any]:
         """Return it as plain data for JSON."""
@@ -91,32 +95,25 @@ def strained(fit: Fit) -> tuple[Strained, ...]:
     return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
 
 
-def implausible_words(plain: Sequence[Strained], final: Sequence[Strained], added: bool
-                      ) -> tuple[str, ...]:
+def implausible_words(found: Sequence[Strained], added: bool) -> tuple[str, ...]:
     """
-    Return the sentence on implausible parameters, or none.
+    Return the sentence on implausible parameters of the model that is the answer, or none.
 
     Parameters
     ----------
-    plain, final : sequence of Strained
-        Of the recalibrated model, and of the one with the finding.
+    found : sequence of Strained
+        What strains the recalibrated model alone, and no longer with the finding, speaks for the
+        finding and is no warning.
     added : bool
-        Whether the two models differ.
+        Whether a finding was added to the recalibrated model.
 
     Returns
     -------
     tuple of str
     """
-    def listed(found: Sequence[Strained]) -> str:
-        return ', '.join(one.words for one in found)
-    if not plain and not (added and final):
+    if not found:
         return ()
-    if not plain:
-        text = f'the model with the finding is implausible beside its nominal: {listed(final)}'
-    else:
-        text = f'the recalibrated model is implausible beside its nominal: {listed(plain)}'
-        if added:
-            text += f'; with the finding: {listed(final)}' if final else (
-                '; with the finding, all parameters are within their tolerances')
-    return (f'{text}; either the model is not one of this robot, or these numbers stand for '
-            'physics that it lacks',)
+    which = 'the recalibrated model with the finding' if added else 'the recalibrated model'
+    return (f'{which} is implausible beside its nominal: '
+            f'{", ".join(one.words for one in found)}; either the model is not one of this '
+            'robot, or these numbers stand for physics that it lacks',)
