@@ -92,8 +92,8 @@ def model_mismatch(found: Sequence[Difference], search: Search, plain_out: Mappi
             plant = compile_model(base.model.structure).at(base.model.parameters)
             out, everywhere = errors(plant, test), errors(plant, parts)
     better = base is not None and _better(plain_out, out)
-    text = capitalised('; '.join(one.statement for one in found))
-    text = f'{text}.{_said(base, better, plain_out, out)}'
+    text = ' '.join(f'{capitalised(one.statement)}.' for one in found)
+    text = f'{text}{_said(base, better, plain_out, out)}'
     finding = Finding('unknown', 'none', first.subsystem, first.elements, first.regime, None, (),
                       0.5 * first.certainty ** 2, math.nan, 1.0, (), text)
     if base is None or not better:

@@ -308,7 +308,13 @@ def _sides(wheels: WheelFit, sides: Number, speed: Number, ahead: ChannelFit | N
     if len(off) == 1 and ahead is not None and not _off(ahead.gain) and _off(
             ratio(ahead.gain, speed)):
         return _error('encoder', gains[off[0]], f'wheel_{off[0]}', side=off[0])
-    return _error('sides', sides, left=wheels.left.value, right=wheels.right.value)
+    return _error('sides', sides, left=_pace(wheels.left.value), right=_pace(wheels.right.value))
+
+
+def _pace(gain: float) -> str:
+    # A factor that is rounded to one is none.
+    said = number(gain)
+    return f'{"" if said == number(1.0) else f"{said} times "}as fast as predicted'
 
 
 def _without_wheels(ahead: ChannelFit | None, yaw: ChannelFit | None, turns: str,

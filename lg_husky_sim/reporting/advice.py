@@ -16,8 +16,8 @@ class _Number(float):
     digits = 3
 
     def __format__(self, spec: str) -> str:
-        return float.__format__(self, spec).replace('-', '−') if spec else number(
-            self, self.digits)
+        return float.__format__(self, spec).replace('-', '−').replace(
+            '%', '\N{NO-BREAK SPACE}%') if spec else number(self, self.digits)
 
 
 def _exact(value: float, low: float, high: float) -> dict[str, _Number]:

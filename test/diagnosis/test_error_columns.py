@@ -13,9 +13,11 @@ from lg_husky_sim.api.diagnosing import DiagnosisResult
 from lg_husky_sim.cli.terminal import marked
 from lg_husky_sim.diagnosis.error_tables import error_tables, with_details
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.model_mismatch import model_mismatch
 from lg_husky_sim.diagnosis.output import summary_text
 from lg_husky_sim.diagnosis.report import report_data
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Finding, Verdict
+from lg_husky_sim.diagnosis.sensors.robot import Difference
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.diagnosis.strain import Strained, strained
 from lg_husky_sim.husky.model_file import load_model
@@ -26,6 +28,7 @@ import pytest
 FOUND = Finding('torque_ripple', 'left', 'drivetrain', ('J_LW',), 'while driving', None, (),
                 800.0, 1e-9, 0.9, (), 'A sentence.')
 DAMPING = Strained('wheel_damping', 'N·m·s/rad', 1.3, 19.5, 0.0952, 10.5, 2.26)
+SIDES = Strained('side_gain_ratio', '1', 1.0, 1.0051, 0.9961, 1.0039, 2.55)
 MASS = Strained('mass', 'kg', 48.0, 58.0, 0.907, 1.10, 3.8, at_bound=True)
 
 
@@ -39,12 +42,10 @@ def _diagnosis(*findings: Finding, **changes: Any) -> Diagnosis:
 
 @pytest.mark.parametrize(('plain', 'final', 'words'), [
     ((DAMPING,), (DAMPING, MASS),
-     'the recalibrated model is implausible beside its nominal: wheel damping ×15 (tolerance '
-     '×0.095 to ×10); with the finding: wheel damping ×15 (tolerance ×0.095 to ×10), mass ×1.2 '
-     '(tolerance ×0.91 to ×1.1, at its bound);'),
-    ((DAMPING,), (), 'with the finding, all parameters are within their tolerances;'),
-    ((), (MASS,), 'the model with the finding is implausible beside its nominal: mass ×1.2'),
-    ((), (), '')])
+     'the recalibrated model with the finding is implausible beside its nominal: wheel damping '
+     '×15 (tolerance ×0.0952 to ×10.5), mass ×1.21 (tolerance ×0.907 to ×1.1, at its bound);'),
+    ((DAMPING,), (SIDES,), ': side gain ratio ×1.005 (tolerance ×0.9961 to ×1.004);'),
+    ((DAMPING,), (), ''), ((), (), '')])
 def test_implausible_parameters_are_said_first_everywhere(
         plain: tuple[Strained, ...], final: tuple[Strained, ...], words: str) -> None:
     said = _diagnosis(FOUND, strained_plain=plain, strained=final)
@@ -159,3 +160,12 @@ def test_gains_and_losses_are_coloured_in_a_terminal() -> None:
     styles = {shown.plain[one.start:one.end].split()[-1]: one.style for one in shown.spans}
     assert styles == {'better': 'bold green', 'worse': 'bold red'} | (
         {'warning:': 'bold red'} if _measured().warnings else {})
+
+
+def test_all_that_differs_is_said_in_sentences_of_its_own() -> None:
+    nothing: Any = None
+    said = model_mismatch(
+        [Difference('traction', (), 'everywhere', words, 9.0, comparable=False)
+         for words in ('There is no ground reaction. It is lifted', 'its wheels are large')],
+        nothing, {}, (), (), nothing, (), nothing).finding.statement
+    assert said == 'There is no ground reaction. It is lifted. Its wheels are large.'

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 import lg_husky_sim as lg
 from lg_husky_sim.cli.main import cli
 from lg_husky_sim.comparison.replay import replay
-from lg_husky_sim.diagnosis.prediction_errors import assess, Assessment, PredictionError
+from lg_husky_sim.diagnosis.prediction_errors import _pace, assess, Assessment, PredictionError
 from lg_husky_sim.recording import Recording, segments
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import TimeSeries
@@ -54,7 +54,7 @@ def test_a_robot_like_the_model_needs_no_change(nominal_drives: list[Recording])
     assert found.errors == ()
     advice, = found.advice()
     assert advice.where == 'Gains and delays agree'
-    assert 'within 2% of 1' in advice.sentences[0]
+    assert 'within 2\N{NO-BREAK SPACE}% of 1' in advice.sentences[0]
 
 
 @pytest.mark.parametrize(('name', 'kind'), [
@@ -154,6 +154,15 @@ def test_an_encoder_is_told_from_a_side_that_turns_more_slowly() -> None:
         'coulomb_drivetrain', side='left', dry_torque=6.0))))
     assert slow.kind == 'sides'
     assert slow.value.value < 0.98
+    assert re.fullmatch(r'The left wheels turn 0\.\d+ times as fast as predicted, the right ones '
+                        r'((0|1)\.\d+ times )?as fast as predicted \(ratio .*\)\.', slow.statement)
+
+
+@pytest.mark.parametrize(('gain', 'words'), [
+    (1.0002, 'as fast as predicted'), (0.9997, 'as fast as predicted'),
+    (0.93, '0.93 times as fast as predicted'), (1.2, '1.2 times as fast as predicted')])
+def test_a_factor_that_is_rounded_to_one_is_not_said(gain: float, words: str) -> None:
+    assert _pace(gain) == words
 
 
 def test_faults_of_sensors_are_said_first_and_not_taken_for_errors_of_the_model(

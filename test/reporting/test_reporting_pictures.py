@@ -124,5 +124,5 @@ def test_advice_names_only_what_was_found() -> None:
     sentences = ('Set `max_yaw: {limit_yaw}`.', 'Set `max_forward: {limit_forward}`.',
                  'The {side} side, {change:+.1%}.')
     assert filled(sentences, {'limit_yaw': 0.50123, 'side': 'left', 'change': -0.0569}) == (
-        'Set `max_yaw: 0.501`.', 'The left side, −5.7%.')
+        'Set `max_yaw: 0.501`.', 'The left side, −5.7\N{NO-BREAK SPACE}%.')
     assert names_in(sentences[2]) == {'side', 'change'}

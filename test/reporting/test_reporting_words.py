@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 
+from lg_husky_sim.reporting.advice import filled
 from lg_husky_sim.reporting.words import with_interval
 import pytest
 
@@ -24,3 +25,8 @@ def test_an_estimate_differs_from_the_ends_of_its_interval(
 
 def test_a_word_stands_behind_the_unit() -> None:
     assert with_interval(0.24, 0.22, 0.25, 's', 'late') == '0.24 s late (0.22 to 0.25)'
+
+
+def test_per_cent_stand_apart_from_their_number_in_sentences_too() -> None:
+    assert filled(['within {gain:.0%} of 1, {low:.1%}'], {'gain': 0.02, 'low': -0.5}) == (
+        'within 2\N{NO-BREAK SPACE}% of 1, −50.0\N{NO-BREAK SPACE}%',)
