@@ -12,13 +12,19 @@ from lg_husky_sim.diagnosis.decision.adoption import evidence_beyond_chance
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.hypotheses.lines import Line, lines
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST
-from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, Effort, efforts, READINGS
+from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import (
+    BALANCES,
+    Effort,
+    efforts,
+    FADING,
+    READINGS,
+)
 from lg_husky_sim.diagnosis.localisation import Missing
 from lg_husky_sim.diagnosis.result import Finding
 from lg_husky_sim.diagnosis.rivals import rivals_of
 from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.effects import descriptions, Subsystem
+from lg_husky_sim.husky.effects import catalogue, descriptions, Subsystem
 from lg_husky_sim.husky.robot_size import RobotSize
 import numpy as np
 
@@ -120,7 +126,10 @@ def felt(rest: Sequence[Effort], free: Sequence[Missing], robot: RobotSize
         # A wheel's are sizes of rates, and beyond what commands can change.
         largest[one.balance] = max(largest[one.balance], float(np.max(np.abs(one.values))),
                                    math.inf if BALANCES[one.balance][2] != 'none' else 0.0)
-    return (tuple(e for e in rest if e.largest >= least[e.balance]),
+    # What a sensor feels beside what it reads is an offset that changes.
+    offset = next(p.negligible for p in catalogue()['gyro_bias'].parameters)
+    return (tuple(e for e in rest if e.largest >= (offset if e.balance in READINGS and (
+        e.argument != READINGS[e.balance][2][0]) else least[e.balance])),
             tuple(m for m in free if largest[m.balance] >= least[m.balance]))
 
 
@@ -154,6 +163,9 @@ def described(effort: Effort) -> str:
         return f'{where} that repeats every {effort.period:.3g} {unit} {of}'
     if effort.argument in PAST:
         return f'{where} that follows {PAST[effort.argument][2]}'
+    if effort.argument in FADING:
+        rate = FADING[effort.argument].replace('_', ' ')
+        return f'{where} in proportion to {rate}, by a smooth function of the time since the start'
     return f'{where}, a smooth function of {effort.argument.replace("_", " ")}'
 
 

@@ -139,6 +139,48 @@ def test_what_repeats_is_unknown_and_says_over_what(
     assert words in said.statement
 
 
+@pytest.mark.parametrize(('quantity', 'size'), [('acceleration', 0.012), ('lateral', 0.03)])
+def test_a_gyro_that_feels_acceleration_errs(fitted: tuple[Evidence, Fit], quantity: str,
+                                             size: float) -> None:
+    """As the g-sensitivity of one; a damping and a radius had been named for it."""
+    evidence, fit = fitted
+    parts = []
+    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
+                                strict=True):
+        drive, times = whitener.frame.drive, probe_times(whitener.frame.drive)
+        forward, yaw = (motion.column(name, 'probe') for name in ('forward', 'yaw_rate'))
+        felt = np.gradient(forward, times) if quantity == 'acceleration' else forward * yaw
+        out = np.zeros((drive.measured.size, 1))
+        part = drive.slice_of(Channel.YAW_RATE)
+        out[part, 0] = size * np.interp(drive.times[part], times, felt)
+        parts.append(whitener.apply(out)[:, 0])
+    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert said.subsystem == 'sensor'
+    assert f'an error of the gyro, a smooth function of {quantity}' in said.statement
+
+
+@pytest.mark.parametrize(('row', 'rate', 'where'), [
+    (LEFT, 'wheel_left', 'a torque on the left wheels in proportion to wheel rate'),
+    (1, 'yaw_rate', 'a yaw moment on the chassis in proportion to yaw')])
+def test_a_loss_that_fades_from_each_start_is_unknown(
+        fitted: tuple[Evidence, Fit], row: int, rate: str, where: str) -> None:
+    """As of cold grease, in either direction; a payload had been named for it."""
+    evidence, fit = fitted
+    parts = []
+    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
+                                strict=True):
+        times = probe_times(whitener.frame.drive)
+        efforts = np.zeros((times.size, 4))
+        efforts[:, row] = -3.0 * np.exp(-(times - times[0]) / 6.0) * motion.column(rate, 'probe')
+        parts.append(_moved(whitener, efforts))
+    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert f'{where}, by a smooth function of the time since the start' in said.statement
+
+
 def test_a_gyro_that_ends_at_some_rate_errs_and_no_effort_is_blamed(
         fitted: tuple[Evidence, Fit]) -> None:
     evidence, fit = fitted

@@ -12,7 +12,9 @@ effort, at the likeliest size s, is::
     max over s of  b' (G + I/s^2)^-1 b / 2 - ln det(I + s^2 G) / 2,   G = C'C,  b = C'e
 
 with the variance of the innovations along C as the effort leaves them, not that of white ones. The
-errors of a gyro or an encoder as a function of what it reads are looked for in the same way.
+errors of a gyro or an encoder as a function of what it reads, and those of a gyro that feels an
+acceleration, are looked for in the same way, and so is a loss that fades, as of grease that is
+cold at first: ``f(time since the start)`` times a rate.
 """
 
 from __future__ import annotations
@@ -43,17 +45,19 @@ BALANCES = {
 }
 #: Quantities that an effort at the chassis and one at the wheels may be a function of.
 CHASSIS = ('forward', 'yaw', 'acceleration', 'heading', 'x', 'y', 'time')
-ARGUMENTS = {'force': (*CHASSIS, 'past_forward', 'past_direction'),
-             'moment': (*CHASSIS, 'past_yaw', 'past_turn'),
+ARGUMENTS = {'force': (*CHASSIS, 'past_forward', 'past_direction', 'fading_forward'),
+             'moment': (*CHASSIS, 'past_yaw', 'past_turn', 'fading_yaw'),
              **dict.fromkeys(('torque_left', 'torque_right'), (
                  'wheel_rate', 'angle', 'wheel_acceleration', 'time', 'past_wheel_rate',
-                 'driving_current'))}
-#: The same of readings, whose errors may follow what they are readings of: channels, side, and the
-#: quantity of each.
+                 'driving_current', 'fading_wheel_rate'))}
+#: Of those that fade, the rate.
+FADING = {'fading_forward': 'forward', 'fading_yaw': 'yaw', 'fading_wheel_rate': 'wheel_rate'}
+#: The same of readings, whose errors may follow what they are readings of, or what a sensor feels
+#: beside it: channels, side, and the quantities of each.
 READINGS = {
-    'gyro': ((Channel.YAW_RATE,), 'none', 'yaw'),
-    'encoder_left': ((Channel.WHEEL_LEFT, Channel.ANGLE_LEFT), 'left', 'wheel_rate'),
-    'encoder_right': ((Channel.WHEEL_RIGHT, Channel.ANGLE_RIGHT), 'right', 'wheel_rate'),
+    'gyro': ((Channel.YAW_RATE,), 'none', ('yaw', 'acceleration', 'lateral_acceleration')),
+    'encoder_left': ((Channel.WHEEL_LEFT, Channel.ANGLE_LEFT), 'left', ('wheel_rate',)),
+    'encoder_right': ((Channel.WHEEL_RIGHT, Channel.ANGLE_RIGHT), 'right', ('wheel_rate',)),
 }
 
 
@@ -106,13 +110,15 @@ def quantities(evidence: Evidence, motions: Sequence[Motion]) -> list[dict[str, 
     """
     found = []
     before = 0.0
+    begun: dict[str, float] = {}
     for drive, motion in zip(evidence.drives, motions, strict=True):
         times = probe_times(drive)
         forward, yaw = motion.column('forward', 'probe'), motion.column('yaw_rate', 'probe')
         one = {'forward': forward, 'yaw': yaw, 'acceleration': np.gradient(forward, times),
                'heading': np.mod(motion.column('heading', 'probe'), 2.0 * np.pi),
                'x': motion.column('x', 'probe'), 'y': motion.column('y', 'probe'),
-               'time': before + times - drive.start}
+               'time': before + times - drive.start, 'lateral_acceleration': forward * yaw,
+               'since_start': times - begun.setdefault(drive.recording, drive.start)}
         before += drive.end - drive.start
         if drive.pose_times.size:
             one['heading'] = np.mod(np.interp(times, drive.pose_times, drive.heading),
@@ -224,15 +230,21 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     def one_of(task: tuple[str, str]) -> Effort | None:
         balance, argument = task
         side = READINGS[balance][1] if balance in READINGS else BALANCES[balance][2]
-        quantity = PAST[argument][0] if argument in PAST else argument
-        name = quantity if side == 'none' or quantity == 'time' else f'{quantity}_{side}'
+        rate = FADING.get(argument)
+        quantity = PAST[argument][0] if argument in PAST else (
+            'since_start' if rate else argument)
+        name = quantity if side == 'none' or quantity in (
+            'time', 'since_start') else f'{quantity}_{side}'
         pooled = np.concatenate([one[name] for one in known])
         low, high = (0.0, 2.0 * np.pi) if argument in ('heading', 'angle') else (
             float(np.min(pooled)), float(np.max(pooled)))
         parts, shapes = [], []
         for one, whitener in zip(known, evidence.whiteners, strict=True):
-            shape = hats(one[name], low, high, count) if quantity == argument else responses(
-                one[name], probe_times(whitener.frame.drive), argument, count)
+            shape = responses(
+                one[name], probe_times(whitener.frame.drive), argument, count
+            ) if argument in PAST else hats(one[name], low, high, count)
+            if rate:
+                shape *= one[rate if side == 'none' else f'{rate}_{side}'][:, None]
             if argument == 'driving_current':
                 # What helps forwards helps backwards.
                 shape *= one[f'sense_{side}'][:, None]
@@ -247,7 +259,7 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
         largest = max(float(np.max(np.abs(shape @ values))) for shape in shapes)
         return Effort(balance, argument, gain, explained, low, high, values, deviations, largest)
     tasks = [*((b, a) for b in BALANCES for a in ARGUMENTS[b]),
-             *((b, argument) for b, (*_, argument) in READINGS.items())]
+             *((b, argument) for b, (*_, own) in READINGS.items() for argument in own)]
     found = [one for one in evidence.pool.map(one_of, tasks) if one is not None]
     return tuple(sorted(found, key=lambda e: -e.evidence))
 
