@@ -10,6 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.reporting.words import digits_apart, number
+from scipy.stats import norm
 
 if TYPE_CHECKING:
     from lg_husky_sim.diagnosis.evidence.evidence import Fit
@@ -78,10 +79,14 @@ def strained(fit: Fit) -> tuple[Strained, ...]:
     Returns
     -------
     tuple of Strained
-        Outside the central 95 % of the prior, or at a bound.
+        Outside the central 95 % of the prior, or at a bound. None where a robot of these
+        tolerances may well be so: of k parameters one is outside with a probability of up to
+        0.05 k, so that the worst must be outside ``1 - 0.05/k`` (Bonferroni) or at a bound.
     """
     found = []
     point, beyond = fit.point, setting('two_sided')
+    count = sum(one.kind == 'model' for one in point.unknowns)
+    worst = float(norm.isf(norm.sf(beyond) / max(count, 1)))
     for unknown, place, distance in zip(point.unknowns, point.places.tolist(),
                                         point.prior_residuals.tolist(), strict=True):
         bound = min(place - unknown.lower, unknown.upper - place) < 1e-6
@@ -92,6 +97,8 @@ def strained(fit: Fit) -> tuple[Strained, ...]:
                        for sign in (-1.0, 1.0))
         found.append(Strained(unknown.name, point.numbers.entry(unknown.name).unit, nominal,
                               unknown.value(place), least, most, distance, bound))
+    if not any(one.at_bound or abs(one.deviations) > worst for one in found):
+        return ()
     return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
 
 
