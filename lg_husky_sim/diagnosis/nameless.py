@@ -24,7 +24,7 @@ from lg_husky_sim.diagnosis.result import Finding
 from lg_husky_sim.diagnosis.rivals import rivals_of
 from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.effects import catalogue, descriptions, Subsystem
+from lg_husky_sim.husky.effects import descriptions, Subsystem
 from lg_husky_sim.husky.robot_size import RobotSize
 import numpy as np
 
@@ -127,7 +127,7 @@ def felt(rest: Sequence[Effort], free: Sequence[Missing], robot: RobotSize
         largest[one.balance] = max(largest[one.balance], float(np.max(np.abs(one.values))),
                                    math.inf if BALANCES[one.balance][2] != 'none' else 0.0)
     # What a sensor feels beside what it reads is an offset that changes.
-    offset = next(p.negligible for p in catalogue()['gyro_bias'].parameters)
+    offset = setting('least_misfelt')
     return (tuple(e for e in rest if e.largest >= (offset if e.balance in READINGS and (
         e.argument != READINGS[e.balance][2][0]) else least[e.balance])),
             tuple(m for m in free if largest[m.balance] >= least[m.balance]))
