@@ -23,7 +23,15 @@ from lg_husky_sim.husky.effects import (
     OnsetKind,
 )
 from lg_husky_sim.husky.model import Drivetrain, Structure
-from lg_husky_sim.husky.model_schema import EFFECT, ONSET, PARAMETER, SCHEMA, STRUCTURE, TOP
+from lg_husky_sim.husky.model_schema import (
+    EFFECT,
+    IMPLIED,
+    ONSET,
+    PARAMETER,
+    SCHEMA,
+    STRUCTURE,
+    TOP,
+)
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.husky.robot_size import HUSKY, RobotSize, size_of
 from lg_husky_sim.yaml_files import shown, wrong_schema
@@ -33,9 +41,6 @@ MOST_ERRORS = 20
 
 NOT_TOLD = 'not told'
 """Source of a parameter whose file tells none."""
-
-IMPLIED = ('side_gain_ratio',)
-"""Parameters that are the packaged robot's where a file has none: its sides are alike."""
 
 _Read = TypeVar('_Read')
 

@@ -19,6 +19,9 @@ from lg_husky_sim.husky.robot_size import RobotSize
 
 SCHEMA = 'lg_husky_sim/model/1'
 
+#: Parameters that are the packaged robot's where a file has none: its sides are alike.
+IMPLIED = ('side_gain_ratio',)
+
 #: A robot of other units: what it has in proportion has no limits that all robots share.
 LARGE = RobotSize(2.0, 3.0, 5.0)
 
@@ -111,13 +114,14 @@ def json_schema(nominal: dict[str, str]) -> dict[str, Any]:
     Parameters
     ----------
     nominal : dict of str to str
-        Name of each parameter that every model must hold, and what to say of it.
+        Name of each parameter that a model holds, and what to say of it.
     """
     kinds = {**catalogue(), **descriptions()}
     effect = {**EFFECT, 'allOf': [_effect(kind) for kind in kinds.values()], 'properties': {
         **EFFECT['properties'],
         'effect': {**EFFECT['properties']['effect'], 'enum': list(kinds)}}}
-    parameters = {**TOP['properties']['parameters'], 'required': list(nominal), 'properties': {
+    needed = [name for name in nominal if name not in IMPLIED]
+    parameters = {**TOP['properties']['parameters'], 'required': needed, 'properties': {
         name: {'description': text, 'allOf': [_SHORT]} for name, text in nominal.items()}}
     return {'title': 'Model of lg_husky', **TOP, 'definitions': {'parameter': PARAMETER},
             'properties': {**TOP['properties'], 'parameters': parameters,

@@ -59,7 +59,7 @@ def test_drive_is_named_in_words_where_one_decides() -> None:
     model = load_model()
     pair = ('gyro_bias', 'wheel_radius_mismatch')
     assert named_drive(pair, model.structure, model.parameters) == (
-        'a long straight run, both ways')
+        'full speed ahead and back without a stop')
     assert named_drive(('slope', 'slope'), model.structure, model.parameters) == ''
 
 

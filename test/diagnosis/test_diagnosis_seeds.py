@@ -106,7 +106,12 @@ def test_each_early_effect_is_read_anew(
     cost = first.cost(first.residuals(first.predict(point)), point)
     read = {t.hypothesis.label: best_reading(first, t.fit) for t in early}
     assert hypothesis.label == 'speed_loop'
-    assert point.reading == read['speed_loop'].point.reading != rough.point.reading
+    # Of the same kind here, with a window of its own.
+    assert point.reading == read['speed_loop'].point.reading
+    windows = [one.log.get('wheel_window') for one in (
+        point, read['speed_loop'].point, rough.point)]
+    assert windows[0] == pytest.approx(windows[1])
+    assert windows[0] < 0.7 * windows[2]
     assert [u.name for u in point.unknowns[-3:]] == [p.name for p in hypothesis.free]
     assert cost == pytest.approx(min(one.cost for one in read.values()))
     # What it explains is counted against a robot as it may be, with the likeliest reading.
