@@ -247,7 +247,9 @@ def _driven(plant: Plant, drive: Drive, wanted: Wanted, delay: float) -> FloatAr
             drive.pose, twist, events.start, drive.wheel_rates, drive.wheel_angles,
             commanded_until(events.start, earlier, drive.twist, drive.wheel_rates)), state)
     onset = plant.onset
-    legs = legs_of(drive, onset, delay) if onset and is_measured(drive, onset) else ()
+    # An onset of which no effect is left changes nothing.
+    legs = legs_of(drive, onset, delay) if (
+        onset and len(plant.sets) > 1 and is_measured(drive, onset)) else ()
     return propagator.run(wanted.events, state, fine_pose=False, legs=legs)
 
 
