@@ -87,3 +87,11 @@ def test_without_a_pose_the_simulation_says_where_it_is(driven: Drive) -> None:
     assert not is_measured(blind, halfway(driven))
     assert not is_measured(driven, Onset(OnsetKind.TIME, 1.0))
     assert not is_measured(driven, None)
+
+
+def test_an_onset_of_which_no_effect_is_left_changes_nothing(driven: Drive) -> None:
+    model, reading = load_model(), Reading()
+    left = replace(model.structure, onset=halfway(driven))
+    plain, kept = (simulate(compile_model(structure).at(model.parameters), driven, reading)
+                   for structure in (model.structure, left))
+    np.testing.assert_array_equal(kept.rows, plain.rows)
