@@ -67,10 +67,12 @@ def error_tables(diagnosis: Diagnosis, changed: bool = False) -> tuple[ErrorTabl
     -------
     tuple of ErrorTable
         On held-out data, if there are any, and on all data; the last column only where
-        something was added to the model, and the change is that to the last column.
+        something was added to the model, and the change is that to the last column. The nominal
+        model alone where none describes the robot: a fit to that is no improvement.
     """
-    how = ('' if changed else ' The nominal model is not fitted; the others are fitted to the '
-           'other half of the data.')
+    how = ('' if changed or not diagnosis.refitted else
+           ' The nominal model is not fitted; the others are fitted to the other half of the '
+           'data.')
     sets = (('Held-out later recordings' if changed else 'Held-out data', True,
              f'Root mean square errors, driven by the commands alone.{how}',
              (diagnosis.held_out_nominal, diagnosis.held_out_plain, diagnosis.held_out_augmented)),
@@ -84,7 +86,8 @@ def error_tables(diagnosis: Diagnosis, changed: bool = False) -> tuple[ErrorTabl
 
 def _shown(diagnosis: Diagnosis) -> tuple[str, ...]:
     # Without a second column of the same numbers where nothing was added.
-    return (NOMINAL, RECALIBRATED, *((WITH_FINDING,) if diagnosis.added else ()))
+    return (NOMINAL, *((RECALIBRATED,) if diagnosis.refitted else ()),
+            *((WITH_FINDING,) if diagnosis.added else ()))
 
 
 def _table(title: str, held_out: bool, note: str, known: Mapping[str, Mapping[str, float]],
@@ -92,7 +95,8 @@ def _table(title: str, held_out: bool, note: str, known: Mapping[str, Mapping[st
     rows = tuple(ErrorRow(quantity_with_unit(key), {
         name: known[name][key] for name in shown if key in known[name]})
         for key in _KEYS if any(key in known[name] for name in shown))
-    return ErrorTable(title, rows, tuple(shown), held_out, (shown[-2], shown[-1]), note)
+    compared = (shown[-2], shown[-1]) if len(shown) > 1 else None
+    return ErrorTable(title, rows, tuple(shown), held_out, compared, note)
 
 
 def with_details(tables: Sequence[ErrorTable], detailed: Sequence[ErrorTable]

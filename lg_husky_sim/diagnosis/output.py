@@ -94,8 +94,8 @@ def _error_lines(tables: Sequence[ErrorTable]) -> list[str]:
     lines = [f'  {name:{first}}' + ''.join(
         f'  {text:>{width}}' for text, width in zip(texts, others, strict=True))
         for name, *texts in rows]
-    before, after = tables[0].columns[-2:]
-    return [*lines, f'  change: from {before} to {after}']
+    compared = tables[0].compared
+    return [*lines, f'  change: from {compared[0]} to {compared[1]}'] if compared else lines
 
 
 def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,

@@ -60,7 +60,9 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
     ReportData
     """
     diagnosis = case.diagnosis
-    plants = {NOMINAL: _plant(case.nominal), RECALIBRATED: case.search.plain.point.plant}
+    plants = {NOMINAL: _plant(case.nominal)}
+    if diagnosis.refitted:
+        plants[RECALIBRATED] = case.search.plain.point.plant
     if diagnosis.added:
         plants[WITH_FINDING] = _plant(diagnosis.model)
     columns = tuple(plants)
@@ -68,7 +70,7 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
         (stretch, {label: replay(_in(case, plant, stretch.recording), stretch)
                    for label, plant in plants.items()})
         for stretch in _stretches(case.segments)]
-    pair = (columns[-2], columns[-1])
+    pair = (columns[-2], columns[-1]) if len(columns) > 1 else None
     tables = [error_table('All data', parts, columns, compared=pair)]
     if len({s.recording for s in case.segments}) > 1:
         tables += [replace(table, title=f'Recording {table.title}', folded=True)
@@ -76,7 +78,7 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
     return report_data(
         diagnosis, list(dict.fromkeys(s.recording for s in case.segments)),
         traces_of(parts, columns), with_details(error_tables(diagnosis), tables),
-        _parameters(case),
+        _parameters(case) if diagnosis.refitted else (),
         shapes={(e.id, e.side): e.shape for e in diagnosis.model.structure.effects},
         sections=(*_tried('Where in the model', lambda: _where(case)),
                   *_tried('A more informative drive', lambda: _telling(case))),

@@ -209,6 +209,11 @@ class Diagnosis:
             self.plain_model.structure, self.plain_model.parameters)
 
     @property
+    def refitted(self) -> bool:
+        """Whether a model fitted here describes the robot: none does that fits by mistake."""
+        return self.fits or self.added
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What speaks against the answer: held-out losses, parameters that are implausible."""
         return (*self._losses(), *(

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.error_tables import error_tables
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -308,6 +309,10 @@ def test_wheels_off_the_ground_are_said_to_be_that_and_nothing_else(clean: Recor
     assert not diagnosis.fits
     assert diagnosis.findings[0].subsystem == 'traction'
     assert 'no ground reaction' in diagnosis.findings[0].statement
+    # A fit to what the model is not about is no improvement, and none is shown.
+    assert 'recalibrated' not in summary_text(diagnosis)
+    assert all(table.columns == ('nominal',) and table.compared is None
+               for table in error_tables(diagnosis))
 
 
 def test_another_robot_is_refused_and_its_reversed_gyro_found_all_the_same(
