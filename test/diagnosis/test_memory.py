@@ -7,7 +7,7 @@ from __future__ import annotations
 from functools import partial
 
 from lg_husky_sim.diagnosis.evidence import memory as memory_module
-from lg_husky_sim.diagnosis.evidence.memory import Memory
+from lg_husky_sim.diagnosis.evidence.memory import Memory, Rows
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave room for three rows of a hundred numbers, and for two things of a kind."""
     values = {'motions_kept': 2500e-6, 'readings_kept': 2}
     monkeypatch.setattr(memory_module, 'setting', values.__getitem__)
+    monkeypatch.setattr(memory_module, '_ROWS', Rows())
 
 
 def never() -> FloatArray:
@@ -51,6 +52,17 @@ def test_what_takes_all_of_the_room_is_kept_alone() -> None:
     memory.rows('small', rows)
     memory.rows('other', rows)
     memory.rows('small', never)
+
+
+def test_drives_share_the_room_for_rows() -> None:
+    one, other = Memory(), Memory()
+    for key in 'ab':
+        one.rows(key, rows)
+        other.rows(key, rows)
+    other.rows('b', never)
+    one.rows('b', never)
+    with pytest.raises(AssertionError, match='made again'):
+        one.rows('a', never)
 
 
 def test_kinds_do_not_take_each_others_room() -> None:

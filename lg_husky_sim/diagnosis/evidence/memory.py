@@ -14,14 +14,42 @@ from lg_husky_sim.signals import FloatArray
 Kept = TypeVar('Kept')
 
 
-class Memory:
-    """What was made last, of each kind, and the simulated rows that were asked for last."""
+class Rows:
+    """The simulated rows that were asked for last, of all drives together."""
 
     def __init__(self) -> None:
-        self._made: dict[str, dict[Hashable, Any]] = {}
         self._rows: dict[Hashable, FloatArray] = {}
         self._size = 0
         self._keeping = Lock()
+
+    def taken(self, key: Hashable) -> FloatArray | None:
+        """Return the rows of a key and keep them no longer."""
+        with self._keeping:
+            found = self._rows.pop(key, None)
+            if found is not None:
+                self._size -= found.nbytes
+            return found
+
+    def keep(self, key: Hashable, rows: FloatArray) -> None:
+        """Keep rows, and those asked for last beside them as far as there is room."""
+        with self._keeping:
+            room = setting('motions_kept') * 1e6 - rows.nbytes
+            while self._rows and self._size > room:
+                self._size -= self._rows.pop(next(iter(self._rows))).nbytes
+            self._rows[key] = rows
+            self._size += rows.nbytes
+
+
+#: Drives are copied, and there are many in a long recording: one room for the rows of all.
+_ROWS = Rows()
+
+
+class Memory:
+    """What was made last of a drive, of each kind, and its rows among those of all drives."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, dict[Hashable, Any]] = {}
+        self._drive = object()
 
     def remembered(self, kind: str, key: Hashable, make: Callable[[], Kept]) -> Kept:
         """Return what was made under a key, among the last of its kind; else make it."""
@@ -37,22 +65,11 @@ class Memory:
 
     def rows(self, key: Hashable, make: Callable[[], FloatArray]) -> FloatArray:
         """Return the simulated rows of a key if they were among the last ones; else make them."""
-        found = self._taken(key)
+        own = (self._drive, key)
+        found = _ROWS.taken(own)
         if found is None:
             found = make()
             found.flags.writeable = False
-        self._taken(key)
-        with self._keeping:
-            room = setting('motions_kept') * 1e6 - found.nbytes
-            while self._rows and self._size > room:
-                self._size -= self._rows.pop(next(iter(self._rows))).nbytes
-            self._rows[key] = found
-            self._size += found.nbytes
+        _ROWS.taken(own)
+        _ROWS.keep(own, found)
         return found
-
-    def _taken(self, key: Hashable) -> FloatArray | None:
-        with self._keeping:
-            found = self._rows.pop(key, None)
-            if found is not None:
-                self._size -= found.nbytes
-            return found
