@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from numbers import Real
 import os
@@ -60,23 +59,11 @@ class Graph(Responses):
         File that it comes from, for messages.
     """
 
-    source = ''
-
     def __init__(self, name: str, graph: LinearGraph, values: Mapping[str, float],
                  outputs: Sequence[str] = (), note: str = '', source: str = '') -> None:
         """Keep what the matrices are derived from when they are first asked for."""
         self.name, self.graph, self.values = name, graph, dict(values)
         self.outputs, self.note, self.source = _listed(outputs), note, source
-
-    @contextmanager
-    def _in_file(self) -> Iterator[None]:
-        """Let errors say which file they are about."""
-        try:
-            yield
-        except (GraphError, ParameterError) as error:
-            if not self.source or str(error).startswith(f'{self.source}: '):
-                raise
-            raise type(error)(f'{self.source}: {error}') from error
 
     @cached_property
     def symbolic(self) -> SymbolicStateSpace:

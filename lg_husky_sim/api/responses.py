@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.api.curves import FrequencyResponse, StepResponse
@@ -18,20 +19,37 @@ from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
     from lg_husky_sim.linear_graph.modes import StepFigures
+    from lg_husky_sim.linear_graph.nonlinear import RightHandSide
 
 
 class Responses(ABC):
     """
     Answers of the linear part of a graph's model; laws that are not linear are left out.
 
-    Results say by name what they are without; those that cannot (symbols, and systems of other
-    tools) come with a warning. Where the graph has one output or one input only, it need not be
-    named.
+    Only :meth:`right_hand_side` has them, for a solver. Results say by name what they are
+    without; those that cannot (symbols, and systems of other tools) come with a warning. Where
+    the graph has one output or one input only, it need not be named.
     """
 
     graph: LinearGraph
     values: Mapping[str, float]
     outputs: tuple[str, ...]
+    source = ''
+
+    @contextmanager
+    def _in_file(self) -> Iterator[None]:
+        """Let errors say which file they are about."""
+        try:
+            yield
+        except (GraphError, ParameterError) as error:
+            if not self.source or str(error).startswith(f'{self.source}: '):
+                raise
+            raise type(error)(f'{self.source}: {error}') from error
+
+    @property
+    def outside(self) -> str:
+        """What not even the graph has; '' for nothing."""
+        return ''
 
     @property
     @abstractmethod
@@ -41,6 +59,37 @@ class Responses(ABC):
     @abstractmethod
     def numeric(self, **values: float) -> StateSpace:
         """Return the model in numbers."""
+
+    def right_hand_side(self, **values: float) -> RightHandSide:
+        """
+        Return dx/dt as a function, with the laws that are not linear in it, for a solver.
+
+        ``solve_ivp(graph.right_hand_side(), (0, 1), x0, args=(inputs,))``; the result's
+        ``output(x, inputs)`` and ``efforts(x, inputs)`` give outputs and efforts of the laws.
+
+        Parameters
+        ----------
+        **values : float
+            Parameters by name, SI, in place of the graph's own.
+
+        Returns
+        -------
+        RightHandSide
+            Of a robot without what is outside its graph, such as a dead time; a warning says so.
+
+        Raises
+        ------
+        GraphError
+            If an input is differentiated.
+        ParameterError
+            If a parameter is unknown, has no number, or one that is not allowed.
+        """
+        from lg_husky_sim.linear_graph.nonlinear import RightHandSide
+        with self._in_file():
+            self.numeric(**values)      # refuses unknown names and what is no number
+            found = RightHandSide(self.graph, {**self.values, **values}, self.outputs)
+        warn_of(self.outside)
+        return found
 
     def transfer_function(self, output: str = '', source: str = '', *, numbers: bool = False,
                           by_parameter: bool = False, **values: float) -> Any:
@@ -107,7 +156,7 @@ class Responses(ABC):
         Return the outputs of the linear part after a unit step of one input, from rest.
 
         What is not linear, as dry friction, is left out, and the result says so; with it,
-        integrate ``RightHandSide`` of ``lg_husky_sim.linear_graph.nonlinear``.
+        integrate :meth:`right_hand_side`.
 
         Parameters
         ----------

@@ -99,9 +99,13 @@ class Husky(Graph):
     @property
     def left_out(self) -> str:
         """What poles, transfer functions and responses are without; '' for nothing."""
+        return '. '.join(filter(None, (super().left_out, self.outside)))
+
+    @property
+    def outside(self) -> str:
+        """What is not in the graph, as a dead time of the commands; '' for nothing."""
         beside = _beside_the_graph(self.model.structure)
-        outside = f'Without {", ".join(beside)}: outside the graph' if beside else ''
-        return '. '.join(filter(None, (super().left_out, outside)))
+        return f'Without {", ".join(beside)}: outside the graph' if beside else ''
 
     def _owner(self, effort: str) -> str:
         return self.model.structure.owners()[effort].id

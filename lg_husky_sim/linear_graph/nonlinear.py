@@ -52,7 +52,7 @@ class RightHandSide:
         if self.space.E.any() or self.space.F.any():
             raise GraphError(
                 f'excess storage {", ".join(model.dependent)} differentiates an input; take '
-                'compile_numeric(graph).at(values).standard_form() instead')
+                'standard_form() of the model in numbers instead')
         structure = model.structure
         laws = [structure.characteristic(edge) for edge in structure.efforts]
         for name, law in zip(model.efforts, laws, strict=True):

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 import warnings
 
 import lg_husky_sim as lg
 from matplotlib.figure import Figure
+import numpy as np
 import pytest
 
 MOTOR = """
@@ -76,3 +78,38 @@ def test_effects_of_a_robot_are_named_by_their_ids() -> None:
         'Without coulomb_drivetrain, traction_saturation: not linear. '
         'Without command_latency: outside the graph')
     assert lg.Husky().with_effect('payload').left_out == ''     # in the matrices
+
+
+def test_the_right_hand_side_has_what_is_not_linear() -> None:
+    """Rates by hand: (torque of the motor - dry friction) over the inertia."""
+    dry, smooth = lg.graph(DRY), lg.graph(DRY).right_hand_side(T_0=0.0)
+    full = dry.right_hand_side()
+    state, inputs = [2.0], [6.0]
+    free = 0.05 * (6.0 - 0.05 * 2.0) / 0.5 / 0.001
+    assert smooth(0.0, state, inputs) == pytest.approx([free])
+    assert full(0.0, state, inputs) == pytest.approx([free - 0.02 * np.tanh(20.0) / 0.001])
+    assert full.output(state, inputs) == pytest.approx([2.0])
+    assert abs(full.efforts(state, inputs)) == pytest.approx([0.02 * np.tanh(20.0)])
+
+
+def test_the_right_hand_side_of_a_robot_warns_of_what_is_outside_its_graph() -> None:
+    husky = lg.Husky().with_effect('coulomb_drivetrain', dry_torque=10.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        rates = husky.right_hand_side()(0.0, [1.0, 1.0, 0.2, 0.0, 0.0, 0.0], [0.0, 0.0])
+    assert rates[0] == rates[1] < 0.0
+    assert rates[0] < lg.Husky().right_hand_side()(0.0, [1.0, 1.0, 0.2, 0.0, 0.0, 0.0],
+                                                   [0.0, 0.0])[0]
+    late = husky.with_effect('command_latency')
+    with pytest.warns(UserWarning, match='Without command_latency: outside the graph') as record:
+        late.right_hand_side()
+    assert record[0].filename == __file__
+
+
+def test_mistakes_in_a_right_hand_side_are_named_with_the_file(tmp_path: Path) -> None:
+    path = tmp_path / 'motor.yaml'
+    path.write_text(DRY.replace(', w_0: 0.1 rad/s', ''), encoding='utf-8')
+    with pytest.raises(lg.LgHuskyError, match=r"motor\.yaml: .*'w_0'.* has no value"):
+        lg.graph(path).right_hand_side()
+    with pytest.raises(lg.LgHuskyError, match="unknown parameter 'T_9'"):
+        lg.graph(DRY).right_hand_side(T_9=1.0)
