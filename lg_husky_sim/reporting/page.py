@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 #: Mismatches in the table of a page; all of them are in the JSON file.
 MOST_MISMATCHES = 15
+#: Errors [SI] that are all but zero: no sensor of a robot tells two of them apart.
+NEGLIGIBLE = 1e-3
 
 
 def code(text: str) -> Markup:
@@ -102,6 +104,8 @@ def error_cells(table: ErrorTable) -> Table:
 def _change_cell(known: Mapping[str, float], compared: tuple[str, str], low: float, high: float
                  ) -> Cell:
     before, after = (known.get(name, math.nan) for name in compared)
+    if max(before, after) < NEGLIGIBLE:
+        return Cell('both near 0')
     words = change(before, after)
     if math.isfinite(low) and math.isfinite(high):
         # On a narrow screen in two lines: the table must not hide its last column.

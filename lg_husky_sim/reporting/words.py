@@ -12,6 +12,8 @@ import sys
 SIGN = 'measured − predicted'
 #: Shown where a number is not known.
 UNKNOWN = '–'
+#: Largest factor of a change that is written out.
+MOST_FACTOR = 1000.0
 
 QUANTITIES: Mapping[str, tuple[str, str]] = {
     'wheel_left': ('left wheel rate', 'rad/s'),
@@ -132,6 +134,8 @@ def change(before: float, after: float, decimals: int = 0) -> str:
     if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
         return UNKNOWN
     share = round(100.0 * (after / before - 1.0), decimals) + 0.0  # no minus zero
+    if after > MOST_FACTOR * before:
+        return f'over ×{MOST_FACTOR:.0f}'
     if share > 999:
         return f'×{after / before:.1f}'
     return f'{share:+.{decimals}f}\u00a0%'.replace('-', '−')

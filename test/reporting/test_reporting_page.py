@@ -161,6 +161,17 @@ def test_a_loss_is_as_visible_as_a_gain() -> None:
         ('+5\u00a0% (−10\u00a0to +20\u00a0%)', Tone.PLAIN), ('+0\u00a0%', Tone.PLAIN)]
 
 
+def test_errors_that_are_all_but_zero_are_neither_better_nor_worse() -> None:
+    """As of a drive that the twin itself simulated: both are what rounding leaves."""
+    table = ErrorTable('held out', (
+        ErrorRow('yaw rate [rad/s]', {NOMINAL: 3.3e-16, RECALIBRATED: 8.2e-6}),
+        ErrorRow('position [m]', {NOMINAL: 8e-4, RECALIBRATED: 4e-4}),
+        ErrorRow('wheel rate [rad/s]', {NOMINAL: 3.7e-13, RECALIBRATED: 0.02}),
+    ), (NOMINAL, RECALIBRATED), compared=(NOMINAL, RECALIBRATED))
+    assert _changes(table) == [
+        ('both near 0', Tone.PLAIN), ('both near 0', Tone.PLAIN), ('over ×1000 worse', Tone.BAD)]
+
+
 def test_models_side_by_side_have_their_best_marked() -> None:
     table = ErrorTable('rec1', (ErrorRow('x [m]', {'a': 0.2, 'b': 0.1}),), ('a', 'b'))
     _, first, second = error_cells(table).rows[0]

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from lg_husky_sim.reporting.advice import filled
-from lg_husky_sim.reporting.words import with_interval
+from lg_husky_sim.reporting.words import change, with_interval
 import pytest
 
 
@@ -30,3 +30,11 @@ def test_a_word_stands_behind_the_unit() -> None:
 def test_per_cent_stand_apart_from_their_number_in_sentences_too() -> None:
     assert filled(['within {gain:.0%} of 1, {low:.1%}'], {'gain': 0.02, 'low': -0.5}) == (
         'within 2\N{NO-BREAK SPACE}% of 1, −50.0\N{NO-BREAK SPACE}%',)
+
+
+@pytest.mark.parametrize(('before', 'after', 'text'), [
+    (1.0, 0.5, '−50\N{NO-BREAK SPACE}%'), (1.0, 12.0, '×12.0'), (1.0, 999.0, '×999.0'),
+    (1e-16, 1.0, 'over ×1000'), (0.0, 1.0, '–'), (1.0, math.inf, '–')])
+def test_a_large_change_is_a_factor_and_no_long_number(before: float, after: float, text: str
+                                                       ) -> None:
+    assert change(before, after) == text
