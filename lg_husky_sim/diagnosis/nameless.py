@@ -19,6 +19,7 @@ from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import (
     FADING,
     READINGS,
 )
+from lg_husky_sim.diagnosis.hypotheses.swings import Swing, swings
 from lg_husky_sim.diagnosis.localisation import Missing
 from lg_husky_sim.diagnosis.result import Finding
 from lg_husky_sim.diagnosis.rivals import rivals_of
@@ -55,9 +56,9 @@ def left_over(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     Returns
     -------
     tuple of Effort
-        Smooth ones and those that repeat, largest evidence first.
+        Smooth ones, those that repeat and those that swing, largest evidence first.
     """
-    return tuple(sorted([*efforts(evidence, fit), *lines(evidence, fit)],
+    return tuple(sorted([*efforts(evidence, fit), *lines(evidence, fit), *swings(evidence, fit)],
                         key=lambda one: -one.evidence))
 
 
@@ -161,6 +162,9 @@ def described(effort: Effort) -> str:
     if isinstance(effort, Line):
         of, unit = REPEATS[effort.argument]
         return f'{where} that repeats every {effort.period:.3g} {unit} {of}'
+    if isinstance(effort, Swing):
+        return (f'{where} that swings every {effort.period:.3g} s in a fixed direction, as on a '
+                'deck that tilts')
     if effort.argument in PAST:
         return f'{where} that follows {PAST[effort.argument][2]}'
     if effort.argument in FADING:

@@ -18,6 +18,7 @@ from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.evidence.whitener import respond
 from lg_husky_sim.diagnosis.hypotheses.lines import chance_of_lines, DENSITY, lines, periodogram
+from lg_husky_sim.diagnosis.hypotheses.swings import swings
 from lg_husky_sim.diagnosis.hypotheses.wheel_bursts import wheel_bursts
 from lg_husky_sim.diagnosis.localisation import missing_efforts
 from lg_husky_sim.diagnosis.nameless import left_over, needed_evidence, unknown_finding
@@ -137,6 +138,40 @@ def test_what_repeats_is_unknown_and_says_over_what(
     assert said is not None
     assert (said.subsystem, said.side) == ('drivetrain', 'left')
     assert words in said.statement
+
+
+@pytest.mark.parametrize(('period', 'way'), [(4.7, 0.0), (9.3, 2.0)])
+def test_a_deck_that_tilts_to_and_fro_is_unknown_and_says_how_fast(
+        fitted: tuple[Evidence, Fit], period: float, way: float) -> None:
+    """In whatever direction; the force counted as noise of the floor, and nothing was missing."""
+    evidence, fit = fitted
+    size, parts = 12.0, []
+    for phase, (whitener, motion) in enumerate(zip(
+            evidence.whiteners, evidence.motions(fit.point, True), strict=True)):
+        times, heading = probe_times(whitener.frame.drive), motion.column('heading', 'probe')
+        efforts = np.zeros((times.size, 4))
+        efforts[:, 0] = size * np.cos(heading - way) * np.sin(
+            2.0 * np.pi / period * times + phase)
+        parts.append(_moved(whitener, efforts))
+    search = _noisy(evidence, fit, np.concatenate(parts))
+    (found,) = swings(evidence, search.final)
+    assert found.period == pytest.approx(period, rel=0.08)
+    # Part of a slow one is taken for the noise that it is like.
+    assert 0.3 * size < found.largest < 1.5 * size
+    verdict, said = _said(search)
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert said.subsystem == 'translation'
+    assert 'a force on the chassis that swings every' in said.statement
+
+
+def test_noise_swings_no_more_often_than_its_evidence_says(fitted: tuple[Evidence, Fit]) -> None:
+    evidence, fit = fitted
+    seen = []
+    for seed in range(12):
+        noise = np.random.default_rng(seed).standard_normal(evidence.count)
+        seen += [one.evidence for one in swings(evidence, replace(fit, whitened=noise))]
+    assert sum(one > np.log(1.0 / 0.05) for one in seen) <= 3
 
 
 @pytest.mark.parametrize(('quantity', 'size'), [('acceleration', 0.012), ('lateral', 0.03)])

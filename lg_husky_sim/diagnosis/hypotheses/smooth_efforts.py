@@ -251,7 +251,7 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
             shapes.append(shape)
             parts.append(whitener.apply(
                 _misread(whitener, balance, shape) if balance in READINGS else
-                _moved(whitener, BALANCES[balance][0], shape)))
+                moved_by(whitener, BALANCES[balance][0], shape)))
         columns = np.concatenate(parts)
         if not np.any(columns):
             return None
@@ -264,8 +264,23 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     return tuple(sorted(found, key=lambda e: -e.evidence))
 
 
-def _moved(whitener: Whitener, row: int, shape: FloatArray) -> FloatArray:
-    # Readings that efforts of such shapes over time move, shape (n, k).
+def moved_by(whitener: Whitener, row: int, shape: FloatArray) -> FloatArray:
+    """
+    Return how efforts move the readings of a drive.
+
+    Parameters
+    ----------
+    whitener : Whitener
+        Of the drive.
+    row : int
+        Number of the balance in the deviation model.
+    shape : numpy.ndarray, shape (n_probe, k)
+        The efforts at its probe times.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n, k)
+    """
     frame, drive = whitener.frame, whitener.frame.drive
     pushed = np.zeros((shape.shape[0], 4, shape.shape[1]))
     pushed[:, row] = shape
