@@ -73,6 +73,12 @@ class Hypothesis:
                 found.append(replace(_of(effect), onset=self.onset))
         return tuple(found)
 
+    @property
+    def other_sides(self) -> tuple[Hypothesis, ...]:
+        """The same on every other side that it can be on."""
+        return tuple(replace(_of(replace(self.effect, side=side)), onset=self.onset)
+                     for side in self.effect.kind.sides if side != self.effect.side)
+
     def at(self, onset: Onset | None) -> Hypothesis:
         """Return this effect with another onset."""
         return replace(self, effect=replace(self.effect, late=onset is not None), onset=onset)

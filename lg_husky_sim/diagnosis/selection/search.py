@@ -40,6 +40,7 @@ from lg_husky_sim.diagnosis.selection.rounds import (
     Tried,
     with_jitter,
 )
+from lg_husky_sim.diagnosis.selection.sides import on_likelier_sides
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -298,6 +299,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             postponed = False
     if len(found) > 1 or ticks or base.point.delays or (
             found and base.point.reading != rounds[0].base.point.reading):
+        base, rounds, found = on_likelier_sides(evidence, plain.point, base, rounds, found)
         base, kept = eliminated(evidence, plain.point, base, found)
         rounds = _without_the_dropped(rounds, found, kept)
         found = kept
