@@ -157,3 +157,14 @@ def test_shares_of_regimes_that_overlap_are_called_so(drive: lg.Recording) -> No
 def test_a_perfect_model_leaves_no_error_that_has_a_cause(drive: lg.Recording) -> None:
     said = str(lg.compare(drive, progress=False).what_to_change)
     assert 'If errors remain, they have another cause' in said
+
+
+def test_wheels_off_the_ground_are_no_reservation(drive: lg.Recording) -> None:
+    """A diagnosis would not look for effects there."""
+    pose = drive.pose
+    noise = 0.003 * np.random.default_rng(1).standard_normal(pose.values.shape)
+    lifted = with_streams(drive, pose=replace(pose, values=noise), imu=None).info()
+    assert lifted.differs
+    assert lifted.verdict.startswith('No diagnosis is possible with this model')
+    assert any('no ground reaction' in one for one in lifted.warnings)
+    assert not drive.info().differs

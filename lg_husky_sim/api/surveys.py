@@ -16,6 +16,7 @@ from lg_husky_sim.api.sensor_warnings import sensor_warnings
 from lg_husky_sim.api.tables import page_part, Table
 from lg_husky_sim.diagnosis.sensors.regression import Number
 from lg_husky_sim.diagnosis.sensors.relations import Relation, relations
+from lg_husky_sim.diagnosis.sensors.robot import differences
 from lg_husky_sim.errors import FitError, ParameterError, RecordingError
 from lg_husky_sim.identification.confidence import confidence, undetermined
 from lg_husky_sim.identification.multistart import refine
@@ -80,6 +81,9 @@ class Survey:
         What each stream says of the others, without a model of the robot.
     unused : tuple of str
         Topics that serve no role.
+    differs : bool
+        Whether the robot is not one of the model, or off the ground: a diagnosis would say so,
+        and look for no effect.
     """
 
     name: str
@@ -95,6 +99,7 @@ class Survey:
     notes: tuple[str, ...] = ()
     sensors: Table = field(default=Table('', (), ()))
     unused: tuple[str, ...] = ()
+    differs: bool = False
 
     @property
     def enough(self) -> bool:
@@ -104,6 +109,8 @@ class Survey:
     @property
     def verdict(self) -> str:
         """What the recording is good for, in one sentence."""
+        if self.enough and self.differs:
+            return 'No diagnosis is possible with this model, from which the robot differs.'
         if self.enough and not self.warnings:
             return 'Enough for a diagnosis.'
         return 'Enough for a diagnosis, with reservations.' if self.enough else (
@@ -165,7 +172,7 @@ def survey(recording: Recording, model: Husky | PathLike | None = None) -> Surve
         _missing(recording, parts, moving, excitation), left_open, recording.notes,
         sensors=_related(related), unused=tuple(
             f'{topic} ({kind})' for topic, kind in sorted(recording.present.items())
-            if topic not in used))
+            if topic not in used), differs=bool(differences(related, husky.parameters)))
 
 
 def _streams(recording: Recording) -> Table:
