@@ -12,7 +12,7 @@ from pathlib import Path
 
 from lg_husky_sim.comparison.models import NamedPlant
 from lg_husky_sim.comparison.outcome import labels, RANKED, RecordingOutcome
-from lg_husky_sim.comparison.slopes import WINDOW
+from lg_husky_sim.comparison.scatter import scatter_note, scatter_of, SHARE
 from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
 from lg_husky_sim.recording.names import printable
 from lg_husky_sim.reporting.data import (
@@ -25,7 +25,6 @@ from lg_husky_sim.reporting.data import (
 )
 from lg_husky_sim.reporting.words import (
     capitalised,
-    number,
     plural,
     quantity,
     quantity_with_unit,
@@ -38,8 +37,6 @@ import numpy as np
 MARKER = 'compare.json'
 """File that tells a folder of comparisons."""
 PAGE = 'index.html'
-#: Share of the error of the forward speed from which the scatter of the pose is worth a note.
-SCATTER = 0.3
 
 
 def write_files(
@@ -125,9 +122,7 @@ def report_data(
         notes.append('Set in every model: ' + ', '.join(
             f'`{name} = {value:g}`' for name, value in settings.items()) + '.')
     scattered = _scatters(traces)
-    notes += [f'{name}: the measured forward speed is the rate of change of the pose, and has a '
-              f'scatter of at least {number(scatter, 2)} m/s of its own: that part of its error '
-              'is not due to a model.' for name, scatter in scattered.items()]
+    notes += [scatter_note(name, scatter) for name, scatter in scattered.items()]
     notes += [f'{outcome.recording.name}: {note}' for outcome in outcomes
               for note in (*outcome.recording.notes, *outcome.gaps())]
     names = ', '.join(outcome.recording.name for outcome in outcomes)
@@ -171,14 +166,10 @@ def _headline(table: ErrorTable, recordings: int, seconds: float) -> Headline:
 def _scatters(traces: Sequence[Trace]) -> dict[str, float]:
     """Return by recording the scatter [m/s] of a forward speed that is noise for a good part."""
     found = {}
-    for trace in (one for one in traces if one.channel == 'forward' and one.times.size > 1):
-        step = max(1, round(WINDOW / max(float(np.median(np.diff(trace.times))), 1e-3)))
-        bends = np.diff(trace.measured[::step], 2)  # slopes that share no sample
-        bends = bends[np.isfinite(bends)]
+    for trace in (one for one in traces if one.channel == 'forward'):
+        scatter = scatter_of(trace.times, trace.measured)
         errors = [trace.measured - values for values in trace.predicted.values()]
-        if not bends.size or not errors:
-            continue
-        scatter = float(np.median(np.abs(bends))) / 0.6745 / math.sqrt(6.0)
-        if scatter > SCATTER * min(float(np.sqrt(np.nanmean(error ** 2))) for error in errors):
+        if errors and scatter > SHARE * min(
+                float(np.sqrt(np.nanmean(error ** 2))) for error in errors):
             found[trace.recording] = scatter
     return found

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
+from lg_husky_sim.comparison.scatter import scatter_notes
 from lg_husky_sim.diagnosis.conclusion import (
     answer,
     estimates,
@@ -140,6 +141,10 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     sensors = tuple(f.statement for f in seen)
     notes = (*said.notes, *_supplied(nominal, numbers), *_mended(recordings))
     said = with_nominal(replace(said, notes=notes, sensors=sensors), nominal, parts, names)
+    known = [one['forward_rmse'] for one in (said.nominal, said.plain, said.augmented)
+             if 'forward_rmse' in one]
+    if known:
+        said = replace(said, notes=(*said.notes, *scatter_notes(parts, min(known))))
     return Case(said, found, parts, nominal, rest, features)
 
 

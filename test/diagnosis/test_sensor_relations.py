@@ -9,6 +9,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+from lg_husky_sim.comparison import scatter
 from lg_husky_sim.diagnosis.diagnose import diagnose
 from lg_husky_sim.diagnosis.error_tables import error_tables
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
@@ -313,6 +314,17 @@ def test_wheels_off_the_ground_are_said_to_be_that_and_nothing_else(clean: Recor
     assert 'recalibrated' not in summary_text(diagnosis)
     assert all(table.columns == ('nominal',) and table.compared is None
                for table in error_tables(diagnosis))
+
+
+def test_the_scatter_of_a_pose_is_said_where_it_is_a_part_of_the_errors(
+        clean: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    pose = clean.stream('pose')
+    values = 0.003 * np.random.default_rng(1).standard_normal(pose.values.shape)
+    still = changed(clean, imu=None, pose=TimeSeries(pose.times, values, pose.names))
+    for share, said in ((0.3, False), (0.01, True)):
+        monkeypatch.setattr(scatter, 'SHARE', share)
+        notes = diagnose([still], load_model(), silent).diagnosis.notes
+        assert any('has a scatter of at least' in note for note in notes) is said
 
 
 def test_another_robot_is_refused_and_its_reversed_gyro_found_all_the_same(
