@@ -91,7 +91,13 @@ def test_a_robot_within_its_tolerances_has_no_seeds(
 
 
 def test_each_early_effect_is_read_anew(
-        record: Recorded, steps: Steps, threads: Threads) -> None:
+        record: Recorded, steps: Steps, threads: Threads, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: dict[int, Fit] = {}
+
+    def once(evidence: Evidence, fit: Fit) -> Fit:
+        made[id(fit)] = made.get(id(fit)) or best_reading(evidence, fit)
+        return made[id(fit)]
+    monkeypatch.setattr(searching, 'best_reading', once)
     plant = _with_loop({'loop_lag': 0.45, 'loop_gain': 2.0, 'loop_integral': 10.0})
     first, start = _begun(record('loop', plant, steps, 1), threads)
     rough = first.fit(start, rounds=1)
@@ -104,7 +110,9 @@ def test_each_early_effect_is_read_anew(
     assert read_anew(first, rough, ()) is None
     _, hypothesis, point = found
     cost = first.cost(first.residuals(first.predict(point)), point)
-    read = {t.hypothesis.label: best_reading(first, t.fit) for t in early}
+    assert len(made) == 2
+    read = {t.hypothesis.label: once(first, t.fit) for t in early}
+    assert len(made) == 2
     assert hypothesis.label == 'speed_loop'
     # Of the same kind here, with a window of its own.
     assert point.reading == read['speed_loop'].point.reading
