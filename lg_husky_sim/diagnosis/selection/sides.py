@@ -12,6 +12,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, with_effects
 from lg_husky_sim.diagnosis.selection.rounds import attempt, Round
+from lg_husky_sim.errors import LgHuskyError
 
 
 def on_likelier_sides(evidence: Evidence, plain: Point, final: Fit, rounds: Sequence[Round],
@@ -45,7 +46,11 @@ def on_likelier_sides(evidence: Evidence, plain: Point, final: Fit, rounds: Sequ
         if not one.other_sides:
             continue
         rest = with_effects(plain, final.point, [h for h in kept if h is not one])
-        base = evidence.fit(rest)
+        try:
+            base = evidence.fit(rest)
+        except LgHuskyError:
+            # The others do not go without it.
+            continue
         for other in one.other_sides:
             tried = attempt(evidence, base, other, list(itertools.product(
                 [base.point, rest], other.starts)))
