@@ -23,7 +23,7 @@ from lg_husky_sim.diagnosis.evidence.unknowns import (
     loosened,
     model_unknown,
 )
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses, with_effects
 from lg_husky_sim.diagnosis.output import headline, summary_text
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.sensors.faults import Fault, faults
@@ -124,6 +124,28 @@ def test_what_all_streams_are_late_does_not_go_into_the_one_at_fault(clean: Reco
         fit = evidence.fit(start, rounds=20)
     (finding,) = fault_findings([fault], fit)
     assert finding.parameters[0].value == pytest.approx(-0.3, abs=0.05)
+
+
+def test_a_certain_fault_keeps_its_number_where_effects_are_left_out(clean: Recording) -> None:
+    recording, model = changed(clean, imu=late(clean.stream('imu'), -0.3)), load_model()
+    drives = drives_of([recording])
+    start, (fault,) = begun_with(beginning(
+        model.structure, base_unknowns(model.parameters, drives), model.parameters, Reading()),
+        certain(found(recording)))
+    one = next(h for h in hypotheses(start.structure) if h.effect.id == 'command_latency')
+    there = one.point(start, {'latency': 0.1})
+    moved = there.at(there.places + 0.001)
+    left = with_effects(start, moved, [])
+    assert [u.name for u in left.unknowns] == [u.name for u in start.unknowns]
+    assert left.values['stamp_delay'] == moved.values['stamp_delay'] != start.values['stamp_delay']
+    kept = with_effects(start, moved, [one])
+    assert [u.name for u in kept.unknowns] == [u.name for u in moved.unknowns]
+    np.testing.assert_array_equal(kept.places, moved.places)
+    with Threads(1) as pool:
+        fit = evidence_of(drives, ['clean'], start, first_guess(drives), pool).fit(left, rounds=1)
+    (finding,) = fault_findings([fault], fit)
+    assert finding.parameters[0].value == pytest.approx(-0.3, abs=0.01)
+    assert ' s early (' in finding.statement.split('which this answer takes')[1]
 
 
 def test_late_wheels_are_told_from_a_body_that_follows_its_wheels(clean: Recording) -> None:

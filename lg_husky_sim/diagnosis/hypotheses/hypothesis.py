@@ -190,7 +190,7 @@ def with_effects(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Poin
     Parameters
     ----------
     plain : Point
-        The model without effects.
+        The model without effects but those of faults that are certain, which stay.
     final : Point
     kept : sequence of Hypothesis
         Their numbers come last.
@@ -199,7 +199,9 @@ def with_effects(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Poin
     -------
     Point
     """
-    base = [place for place, unknown in enumerate(final.unknowns) if unknown.kind != 'effect']
+    own = {unknown.name for unknown in plain.unknowns}
+    base = [place for place, unknown in enumerate(final.unknowns)
+            if unknown.kind != 'effect' or unknown.name in own]
     point = replace(plain, reading=final.reading, places=np.array(final.places[base]),
                     unknowns=tuple(final.unknowns[place] for place in base))
     return having(point, final, kept)

@@ -21,6 +21,7 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
 )
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.elimination import eliminated
+from lg_husky_sim.diagnosis.selection.exchange import exchanged
 from lg_husky_sim.diagnosis.selection.laws import Laws
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.selection.recalibration import (
@@ -40,7 +41,6 @@ from lg_husky_sim.diagnosis.selection.rounds import (
     Tried,
     with_jitter,
 )
-from lg_husky_sim.diagnosis.selection.sides import on_likelier_sides
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -299,7 +299,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             postponed = False
     if len(found) > 1 or ticks or base.point.delays or (
             found and base.point.reading != rounds[0].base.point.reading):
-        base, rounds, found = on_likelier_sides(evidence, plain.point, base, rounds, found)
+        base, rounds, found = exchanged(evidence, plain.point, base, rounds, found)
         base, kept = eliminated(evidence, plain.point, base, found)
         rounds = _without_the_dropped(rounds, found, kept)
         found = kept
