@@ -118,6 +118,10 @@ class Parameters(Mapping[str, float]):
         except KeyError:
             raise self._unknown(name) from None
 
+    def __contains__(self, name: object) -> bool:
+        """Return whether there is a parameter of that name, without looking for near ones."""
+        return name in self._index  # type: ignore[attr-defined]
+
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names."""
         return iter(self._index)  # type: ignore[attr-defined]

@@ -116,3 +116,17 @@ def test_a_structure_says_which_parameter_it_misses() -> None:
         fewer = Parameters(tuple(e for e in parameters.entries if e.name != name))
         with pytest.raises(ParameterError, match=message):
             compile_model(Structure()).at(fewer)
+
+
+def test_asking_whether_there_is_a_parameter_looks_for_no_near_name(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Models are compiled by such questions; near names are for messages."""
+    parameters = load_model().parameters
+    with pytest.raises(KeyError, match='did you mean mass'):
+        parameters['mas']
+
+    def near(*_: object, **__: object) -> None:
+        raise AssertionError
+    monkeypatch.setattr('difflib.get_close_matches', near)
+    assert 'mass' in parameters
+    assert 'mas' not in parameters
