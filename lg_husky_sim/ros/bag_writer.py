@@ -4,15 +4,50 @@
 
 from __future__ import annotations
 
+import ctypes
 from importlib import import_module
 from importlib.util import find_spec
+import os
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from lg_husky_sim.errors import MissingExtraError, RecordingError
 from lg_husky_sim.ros import api
 
 STORAGES = ('mcap', 'sqlite3')
+#: What rosbag2 writes of a publisher that offers what it said last, deep enough for the transforms
+#: of several nodes, which a player sends by one publisher; durations are unspecified.
+LATCHED = """\
+- history: keep_last
+  depth: 100
+  reliability: reliable
+  durability: transient_local
+  deadline: {sec: 0, nsec: 0}
+  lifespan: {sec: 0, nsec: 0}
+  liveliness: automatic
+  liveliness_lease_duration: {sec: 0, nsec: 0}
+  avoid_ros_namespace_conventions: false
+"""
+#: Version of the metadata that has these as words.
+_VERSION: Final = 9
+
+
+def latched(topic: str) -> bool:
+    """
+    Return whether players must offer what was said before (durability transient local).
+
+    Transforms that stand still are asked for that way by every listener of tf, and from a
+    publisher that does not offer it nothing comes; all else is heard from any publisher.
+    """
+    return topic.rpartition('/')[2] == 'tf_static'
+
+
+def _latched_of_rosbags() -> Any:
+    from rosbags import interfaces as of
+    never = of.QosTime(0, 0)
+    return of.Qos(of.QosHistory.KEEP_LAST, 100, of.QosReliability.RELIABLE,
+                  of.QosDurability.TRANSIENT_LOCAL, never, never, of.QosLiveliness.AUTOMATIC,
+                  never, avoid_ros_namespace_conventions=False)
 
 
 class BagWriter(Protocol):
@@ -54,11 +89,15 @@ class Rosbag2Writer:
                                       storage_preset_profile=preset),
             rosbag2_py.ConverterOptions('cdr', 'cdr'))
         self._count = 0
+        self._buffered = storage == 'mcap' and os.name == 'posix'
 
     def add(self, topic: str, kind: str) -> None:
         """Tell of a topic before its first message."""
+        offered = (self._module.to_rclcpp_qos_vector(LATCHED, _VERSION) if latched(topic)
+                   else [])
         self._writer.create_topic(self._module.TopicMetadata(
-            id=self._count, name=topic, type=kind, serialization_format='cdr'))
+            id=self._count, name=topic, type=kind, serialization_format='cdr',
+            offered_qos_profiles=offered))
         self._count += 1
 
     def write(self, topic: str, nanoseconds: int, raw: bytes) -> None:
@@ -66,7 +105,9 @@ class Rosbag2Writer:
         self._writer.write(topic, raw, nanoseconds)
 
     def flush(self) -> None:
-        """Do nothing: it holds nothing back."""
+        """Have what C keeps of a file of mcap written: 4096 bytes are minutes of a slow topic."""
+        if self._buffered:
+            ctypes.CDLL(None).fflush(None)
 
     def close(self) -> None:
         """Complete the bag."""
@@ -91,7 +132,7 @@ class RosbagsWriter:
         from rosbags.typesys import get_typestore, Stores
         self._store = get_typestore(Stores.ROS2_JAZZY)
         plugin = StoragePlugin.MCAP if kind == 'mcap' else StoragePlugin.SQLITE3
-        self._writer: Any = Writer(path, version=9, storage_plugin=plugin)
+        self._writer: Any = Writer(path, version=_VERSION, storage_plugin=plugin)
         self._writer.open()
         self._mcap = kind == 'mcap'
         if not self._mcap:
@@ -102,7 +143,9 @@ class RosbagsWriter:
 
     def add(self, topic: str, kind: str) -> None:
         """Tell of a topic before its first message."""
-        self._connections[topic] = self._writer.add_connection(topic, kind, typestore=self._store)
+        self._connections[topic] = self._writer.add_connection(
+            topic, kind, typestore=self._store,
+            offered_qos_profiles=[_latched_of_rosbags()] if latched(topic) else [])
 
     def write(self, topic: str, nanoseconds: int, raw: bytes) -> None:
         """Append a message."""

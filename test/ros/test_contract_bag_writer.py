@@ -1,0 +1,61 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a recorder writes: on disk at once, and played so that all who listen hear it."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+import sqlite3
+
+from lg_husky_sim.ros import api, bag_writer
+import pytest
+import yaml
+
+pytestmark = pytest.mark.skipif(
+    find_spec('rosbags') is None and not (api.HAVE_RCLPY and find_spec('rosbag2_py')),
+    reason='nothing is installed that writes bags')
+
+
+def writers() -> list[str]:
+    """Return the names of those that can be had here."""
+    ros = ['Rosbag2Writer'] if api.HAVE_RCLPY and find_spec('rosbag2_py') else []
+    return [*ros, *(['RosbagsWriter'] if find_spec('rosbags') else [])]
+
+
+@pytest.mark.parametrize('storage', bag_writer.STORAGES)
+@pytest.mark.parametrize('name', writers())
+def test_static_transforms_are_played_as_their_listeners_ask(
+        tmp_path: Path, name: str, storage: str) -> None:
+    """Played volatile, as rosbag2 plays what says nothing, no listener of tf hears them."""
+    writer = getattr(bag_writer, name)(tmp_path / 'bag', storage)
+    for topic in ('/tf', '/tf_static', '/a200/tf_static'):
+        writer.add(topic, 'tf2_msgs/msg/TFMessage')
+    writer.close()
+    told = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())
+    offered = {one['topic_metadata']['name']: one['topic_metadata']['offered_qos_profiles']
+               for one in told['rosbag2_bagfile_information']['topics_with_message_count']}
+    assert not offered['/tf']
+    for topic in ('/tf_static', '/a200/tf_static'):
+        (one,) = offered[topic]
+        assert (one['durability'], one['reliability'], one['history'], one['depth']) == (
+            'transient_local', 'reliable', 'keep_last', 100)
+
+
+@pytest.mark.parametrize('storage', bag_writer.STORAGES)
+@pytest.mark.parametrize('name', writers())
+def test_a_short_message_is_on_disk_after_a_flush(
+        tmp_path: Path, name: str, storage: str) -> None:
+    """Of topics of a few bytes a second, a file's buffer of 4096 bytes held minutes back."""
+    writer = getattr(bag_writer, name)(tmp_path / 'bag', storage)
+    writer.add('/said', 'std_msgs/msg/String')
+    raw = b'\x00\x01\x00\x00\x0e\x00\x00\x00these are kept\x00'
+    writer.write('/said', 10**18, raw)
+    writer.flush()
+    (path,) = (one for one in (tmp_path / 'bag').iterdir() if one.suffix in ('.mcap', '.db3'))
+    if storage == 'mcap':
+        assert b'these are kept' in path.read_bytes()
+    else:
+        with sqlite3.connect(path) as base:
+            assert base.execute('SELECT COUNT(*) FROM messages').fetchone() == (1,)
+    writer.close()
