@@ -13,6 +13,9 @@ from lg_husky_sim.ros.settings import Settings
 _SECOND = 1_000_000_000
 #: A ROS clock that moves against the steady one by this much between two looks has jumped [ns].
 _JUMP = 100_000_000
+#: Silence on /clock after which it is said that the robot waits for it [ns]; Fast DDS may tell of
+#: its publisher after 3 s only.
+_SILENCE = 5 * _SECOND
 
 
 class Clockwork:
@@ -30,7 +33,7 @@ class Clockwork:
     follows : callable
         Whether that clock is the authority.
     warn : callable
-        Is told of jumps.
+        Is told of jumps, and of a /clock that does not come.
 
     """
 
@@ -38,7 +41,8 @@ class Clockwork:
                  warn: Callable[[str], object]) -> None:
         """Stand still until :meth:`resume`."""
         self._ros_now, self._follows, self._warn = ros_now, follows, warn
-        self._following = self._heard = False
+        self._following = self._heard = self._missed = False
+        self._since = 0
         self._last = 0
         self._offset = 0
 
@@ -56,6 +60,7 @@ class Clockwork:
         """
         self._settings = settings
         self._following = self._follows()
+        self._since = time.monotonic_ns()
         speed = 1.0 if self._following else settings.speed or 1.0
         now = self._ros_now()
         self._heard = now > 0
@@ -78,13 +83,18 @@ class Clockwork:
     def look(self, total: int) -> None:
         """Notice jumps of the clocks; call before asking what is due."""
         if self._follows() != self._following:
+            if not self._following:
+                # Stamps of another clock; /clock does not run back from them.
+                self._last, self._missed = 0, False
             self.resume(self._settings, total)
             return
         now = self._ros_now()
         if self._following:
-            if not self._heard and now > 0:
+            if now > 0 and not self._heard:
                 # The first word of /clock says where time stands, not that it has passed.
                 self.resume(self._settings, total)
+            elif not self._heard:
+                self._miss()
             elif now < self._last:
                 self._warn(f'/clock went back by {(self._last - now) / _SECOND:.3f} s; steps and '
                            'stamps restart there')
@@ -102,6 +112,12 @@ class Clockwork:
         else:
             self._warn(f'the clock jumped by {moved / _SECOND:+.3f} s; stamps never go '
                        'backwards and continue as before')
+
+    def _miss(self) -> None:
+        if not self._missed and time.monotonic_ns() - self._since >= _SILENCE:
+            self._missed = True
+            self._warn(f'use_sim_time is set and nothing has come on /clock for '
+                       f'{_SILENCE / _SECOND:g} s: the robot stands still until it does')
 
     def due(self, total: int) -> int:
         """Return how many steps are due."""
