@@ -9,7 +9,13 @@ from dataclasses import replace
 from typing import Any
 
 from lg_husky_sim.errors import SettingsError
-from lg_husky_sim.ros.api import message_type, Node, Parameter, parameter_overrides
+from lg_husky_sim.ros.api import (
+    message_type,
+    Node,
+    Parameter,
+    parameter,
+    parameter_overrides,
+)
 from lg_husky_sim.ros.settings import (
     BY_NAME,
     make_settings,
@@ -45,7 +51,7 @@ def _plain(value: object) -> object:
 
 def given_settings(node: Node) -> dict[str, object]:
     """Return what command line and files give of the settings; warn of what is none."""
-    given = {name: parameter.value for name, parameter in parameter_overrides(node).items()
+    given = {name: override.value for name, override in parameter_overrides(node).items()
              if name not in _OF_ROS}
     for name in sorted(set(given) - set(BY_NAME)):
         node.get_logger().warning(
@@ -99,6 +105,7 @@ class LiveSettings:
 
     def __init__(self, node: Node, settings: Settings, apply: Callable[[Settings], None]) -> None:
         """Watch the node's parameters."""
+        self._node = node
         self._settings = settings
         self._apply = apply
         self._result = message_type('rcl_interfaces/msg/SetParametersResult')
@@ -122,7 +129,7 @@ class LiveSettings:
 
     def changed(self, **values: object) -> Settings:
         """
-        Change settings from inside, by a topic.
+        Change settings from inside, by a topic, and the parameters of the same names.
 
         Raises
         ------
@@ -130,7 +137,10 @@ class LiveSettings:
             If a value is not allowed.
 
         """
-        settings = replace(self._settings, **values)  # type: ignore[arg-type]
-        self._apply(settings)
-        self._settings = settings
-        return settings
+        # What is not allowed is said in our own words, not in those of the middleware.
+        replace(self._settings, **values)  # type: ignore[arg-type]
+        for result in self._node.set_parameters(
+                [parameter(name, value) for name, value in values.items()]):
+            if not result.successful:
+                raise SettingsError(result.reason)
+        return self._settings

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import itertools
+from pathlib import Path
 import time
 from typing import Any
 
+from lg_husky_sim import Husky
 from lg_husky_sim.ros import api, diagnostics, neighbours, outputs
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.ros.simulation_node import SimNode
@@ -234,6 +236,29 @@ def test_a_parameter_can_change_by_the_api_and_is_checked(
     assert 'cannot be used' in outcome('model', '/no/file.yaml')
     assert node.settings.model == ''
     assert node.engine.settings.command_timeout == 1.5
+
+
+def test_what_a_topic_sets_is_the_parameter(
+        probe: Probe, made: list[SimNode], tmp_path: Path) -> None:
+    """`ros2 param get /sim_node speed` said 1.0 of a node at twice the speed."""
+    node = add(probe, made, 'topical', '/topical')
+    path = tmp_path / 'uneven.yaml'
+    Husky().replacing(side_gain_ratio=1.04).save(str(path))
+    speed, number = probe.talk('std_msgs/msg/Float64', '/topical/topical/speed')
+    model, text = probe.talk('std_msgs/msg/String', '/topical/topical/load_model')
+    assert probe.until(lambda: min(
+        one.get_subscription_count() for one in (speed, model)) > 0)
+    speed.publish(number(data=2.0))
+    model.publish(text(data=str(path)))
+    assert probe.until(lambda: node.get_parameter('model').value == str(path))
+    assert node.get_parameter('speed').value == node.settings.speed == 2.0
+    assert node.settings.model == str(path)
+    speed.publish(number(data=-1.0))
+    model.publish(text(data='/no/file.yaml'))
+    probe.spin(0.5)
+    assert (node.get_parameter('speed').value, node.get_parameter('model').value) == (
+        2.0, str(path))
+    assert (node.settings.speed, node.settings.model) == (2.0, str(path))
 
 
 def test_what_cannot_be_published_is_not_announced(monkeypatch: pytest.MonkeyPatch) -> None:
