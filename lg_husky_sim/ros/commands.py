@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 import math
 import time
@@ -104,8 +105,10 @@ class Commands:
             if time.monotonic() > end:
                 self.settle()
                 raise CommandError(self._silence(seconds))
-        names = ', '.join(dict.fromkeys(
-            f'{one.node} ({one.kind.rpartition("/")[2]})' for one in self.robots()))
+        # Two of one name are two robots that move.
+        counts = Counter(f'{one.node} ({one.kind.rpartition("/")[2]})' for one in self.robots())
+        names = ', '.join(name + (f' ×{count}' if count > 1 else '')
+                          for name, count in counts.items())
         limits = ', '.join(f'at most {limit:g} {unit}' for limit, unit in (
             (self._settings.max_forward, 'm/s'), (self._settings.max_yaw, 'rad/s')) if limit > 0.0)
         say(f'{self.topic} moves {names}; {limits or "no limit in this preset"}')

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 import time
 
 from lg_husky_sim.errors import CommandError, SettingsError
-from lg_husky_sim.ros.graph import find_robots, Robot, the_one
+from lg_husky_sim.ros import commands
+from lg_husky_sim.ros.graph import Endpoint, find_robots, Robot, the_one
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.ros.tool import choose, Orderly, Tool
 from lg_husky_sim.testing.live import Probe
@@ -99,3 +100,20 @@ def test_the_graph_is_not_left_between_looking_and_serving(
         tool = Tool('lg_husky_recorder', orderly)
         assert left == ['lg_husky_look']
         tool.close()
+
+
+@pytest.mark.parametrize(('count', 'words'), [(1, ''), (2, ' ×2')])
+def test_two_robots_of_one_name_are_two_that_move(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch, count: int, words: str) -> None:
+    """Both of two nodes `/sim_node` were moved, and one was announced."""
+    probe.listen('geometry_msgs/msg/Twist', '/same/cmd_vel')
+    monkeypatch.setattr(commands, 'listeners', lambda node, topic: count * (
+        Endpoint('/sim_node', 'geometry_msgs/msg/Twist', True, False),))
+    said: list[str] = []
+    tool = Tool('lg_husky_driver', Orderly())
+    try:
+        commands.Commands(tool, make_settings(command_topic='/same/cmd_vel')).wait(
+            5.0, said.append)
+    finally:
+        tool.close()
+    assert said == [f'/same/cmd_vel moves /sim_node (Twist){words}; no limit in this preset']
