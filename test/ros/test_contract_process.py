@@ -15,6 +15,7 @@ import sys
 import time
 from typing import Any
 
+from lg_husky_sim import Husky
 from lg_husky_sim.jit import compiled
 from lg_husky_sim.ros import api
 from lg_husky_sim.ros.settings import make_settings
@@ -327,6 +328,31 @@ def test_a_changed_model_file_runs_on_without_a_jump(
         # No further in a step than at the larger of its speeds, no less than at the smaller.
         assert (t1 - t0) * min(v0, v1) - 1e-6 <= x1 - x0 <= (t1 - t0) * max(v0, v1) + 1e-6
     assert math.isclose(truth[-1].twist.twist.linear.x, 0.8 * 0.5065, rel_tol=0.02)
+
+
+@pytest.mark.parametrize('ratio', [1.04, 1.0, 1.0 / 1.04])
+def test_a_model_of_uneven_sides_drives_a_curve(
+        probe: Probe, start: Start, tmp_path: Path, ratio: float) -> None:
+    """A node that is started with such a file goes to its weaker side, told to go straight on."""
+    path = tmp_path / 'uneven.yaml'
+    Husky().replacing(side_gain_ratio=ratio).save(str(path))
+    truth = probe.listen('nav_msgs/msg/Odometry', '/uneven', 100)
+    command, kind = probe.talk('geometry_msgs/msg/Twist', '/uneven_cmd')
+    husky = start(model=str(path), ground_truth_topic='/uneven', command_topic='/uneven_cmd',
+                  command_timeout=0.0, speed=4.0)
+    husky.ready(truth)
+    assert probe.until(lambda: command.get_subscription_count())
+    message = kind()
+    message.linear.x = 1.0
+    command.publish(message)
+    assert probe.until(lambda: truth[-1].pose.pose.position.x > 4.0)
+    pose = truth[-1].pose.pose
+    heading = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
+    # 0.215 rad after 5.8 m by the simulation at 0.96 m/s; more of it the later it is looked at.
+    assert (heading, pose.position.y) == (
+        (0.0, 0.0) if ratio == 1.0 else (pytest.approx(-math.copysign(
+            0.215 / 5.8, ratio - 1.0) * pose.position.x, rel=0.15),
+            pytest.approx(0.5 * heading * pose.position.x, rel=0.15)))
 
 
 def test_settings_of_the_presets_differ_together() -> None:
