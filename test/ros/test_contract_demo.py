@@ -41,6 +41,10 @@ def test_a_driven_recording_can_be_read_and_summed_up(
         SHORT.commands()) + ZEROS)
     probe.spin(0.5)
     assert husky.node.stop() == 0
+    served = -1
+    while served != sum(recorder.counts.values()):
+        served = sum(recorder.counts.values())
+        probe.spin(0.3)
     recorder.close()
     assert seen == sorted(seen)
     recording = read_recording(tmp_path / 'bag')
