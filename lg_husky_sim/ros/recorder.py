@@ -106,8 +106,8 @@ class Recorder:
             else api.ReliabilityPolicy.BEST_EFFORT,
             durability=api.DurabilityPolicy.TRANSIENT_LOCAL if latched
             else api.DurabilityPolicy.VOLATILE)
-        self._heard[topic] = (quality, self._node.create_subscription(
-            api.message_type(self._kinds[topic]), topic, self._writing(topic), profile))
+        self._heard[topic] = (quality, api.raw_subscription(
+            self._node, self._kinds[topic], topic, self._writing(topic), profile))
 
     def _look(self) -> None:
         for topic, kind in self._kinds.items():
@@ -117,10 +117,10 @@ class Recorder:
                 self._node.destroy_subscription(subscription)
                 self._subscribe(topic, wanted)
 
-    def _writing(self, topic: str) -> Callable[[Any], None]:
-        def write(message: Any) -> None:
+    def _writing(self, topic: str) -> Callable[[bytes], None]:
+        def write(raw: bytes) -> None:
             if self._writer is not None:
-                self._writer.write(topic, time.time_ns(), api.serialised(message))
+                self._writer.write(topic, time.time_ns(), raw)
                 self.counts[topic] += 1
         return write
 
