@@ -215,9 +215,11 @@ def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Any
     Parameters
     ----------
     node : Node
+        Serves the timer.
     period : float
         [s]
     callback : callable
+        Is called at the end of each period.
 
     """
     if not HAVE_RCLPY:

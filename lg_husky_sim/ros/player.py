@@ -91,6 +91,7 @@ def play(tool: Tool, streams: Mapping[str, TimeSeries], settings: Settings, *,
         If there is nothing to send, or nobody listens.
     Ended
         If the tool was asked to end; the robot is stopped then.
+
     """
     names = [n for n in ('command', 'wheels', 'imu', 'pose') if n in streams]
     if not names:

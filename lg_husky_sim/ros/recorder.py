@@ -167,6 +167,7 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
     Parameters
     ----------
     tool : Tool
+        Serves the subscriptions.
     path : Path
         Folder to make.
     settings : Settings

@@ -37,6 +37,7 @@ class RunningError:
     ----------
     memory : float
         Time constant of forgetting [s].
+
     """
 
     memory: float = MEMORY
@@ -79,6 +80,7 @@ class Shadow:
     settings : Settings, optional
         Of the robot: its limits of speed and acceleration, and the time after which it forgets
         a command; by default those of the paper, which has none.
+
     """
 
     plant: Plant

@@ -255,6 +255,7 @@ class SimNode(Node):
         Parameters
         ----------
         count : int
+            Number of steps.
         done : callable, optional
             Is told True once all are made, or False if a pause, resume or reset came between.
 

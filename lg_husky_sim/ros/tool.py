@@ -232,6 +232,7 @@ def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wai
     Parameters
     ----------
     orderly : Orderly
+        Says when the tool was asked to end.
     preset, namespace : str, optional
         Look for these only.
     wait : float
@@ -283,6 +284,7 @@ def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = N
     Parameters
     ----------
     orderly : Orderly
+        Says when the tool was asked to end.
     arguments : sequence of str
         What stands behind ``--ros-args``.
     preset, namespace : str, optional

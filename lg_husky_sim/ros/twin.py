@@ -51,6 +51,7 @@ class Twin:
     pose_topic : str, optional
         Odometry that tells where the robot really is (filtered, or ground truth): the models are
         kept there. Without it they begin at the pose of the wheel odometry and go by themselves.
+
     """
 
     def __init__(self, tool: Tool, plants: Mapping[str, Plant], settings: Settings, sides: Sides,

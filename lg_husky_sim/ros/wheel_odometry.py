@@ -27,6 +27,7 @@ def assumed_for(model: object) -> dict[str, float]:
     dict of str to float
         Settings by name; none for a Husky, or for a file that cannot be read, of which the node
         says so when it loads it.
+
     """
     if not isinstance(model, str) or not model:
         return {}

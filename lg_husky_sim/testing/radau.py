@@ -36,6 +36,7 @@ class Reference:
     method : str
         Scipy's name of it. Radau suits any law; DOP853, of order 8 and explicit, is the faster one
         to very small errors where nothing is faster than the electrical modes.
+
     """
 
     plant: Plant
@@ -92,6 +93,7 @@ class Reference:
         -------
         TimeSeries
             The channels of :data:`NOISE`.
+
         """
         from scipy.integrate import solve_ivp
 
