@@ -23,6 +23,8 @@ SPACING = 0.02
 #: How long to wait for the names of the nodes that listen [s]; the middleware tells them after it
 #: has told that there is a listener. Until then nobody knows whether it is a recorder.
 NAMES = 3.0
+#: How long nobody may listen before that is an error [s].
+DEAF = 1.0
 #: What a tool says to its user.
 Say = Callable[[str], object]
 
@@ -56,6 +58,7 @@ class Commands:
         self._publisher = tool.node.create_publisher(self._class, settings.command_topic, 10)
         #: Commands that were sent, and those of them that were beyond the limits.
         self.sent = self.limited = 0
+        self._last_heard = 0.0
 
     def __enter__(self) -> Commands:
         """Return itself."""
@@ -75,6 +78,23 @@ class Commands:
         """Return whether a robot is connected that takes this type."""
         return self._publisher.get_subscription_count() > 0 and any(
             end.kind == self.kind for end in self.robots())
+
+    def check_heard(self) -> None:
+        """
+        Go on only while somebody listens: who comes back is not to be moved from the middle on.
+
+        Raises
+        ------
+        CommandError
+            If nobody has listened for :data:`DEAF`.
+
+        """
+        now = time.monotonic()
+        if self.sent <= 1 or self.heard():
+            self._last_heard = now
+        elif now - self._last_heard > DEAF:
+            raise CommandError(
+                f'{self.topic}: nobody listens any more, after {self.sent} commands')
 
     def settle(self) -> None:
         """Wait for all the nodes that listen to be known by name, for some seconds at most."""

@@ -42,7 +42,7 @@ def drive(tool: Tool, manoeuvre: Manoeuvre, settings: Settings, *, wait: float =
     Raises
     ------
     CommandError
-        If nobody listens.
+        If nobody listens, or nobody does any more.
     Ended
         If the tool was asked to end; the robot is stopped then.
 
@@ -57,6 +57,7 @@ def drive(tool: Tool, manoeuvre: Manoeuvre, settings: Settings, *, wait: float =
             tool.serve_until(start + moment)
             tool.orderly.check()
             commands.send(forward, yaw)
+            commands.check_heard()
             if progress is not None:
                 progress(moment)
     if commands.limited:

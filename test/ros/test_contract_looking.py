@@ -8,7 +8,9 @@ from collections.abc import Mapping
 import time
 
 from lg_husky_sim.errors import CommandError, SettingsError
+from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.ros import commands
+from lg_husky_sim.ros.driver import drive
 from lg_husky_sim.ros.graph import Endpoint, find_robots, Robot, the_one
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.ros.tool import choose, Orderly, Tool
@@ -117,3 +119,22 @@ def test_two_robots_of_one_name_are_two_that_move(
     finally:
         tool.close()
     assert said == [f'/same/cmd_vel moves /sim_node (Twist){words}; no limit in this preset']
+
+
+def test_a_drive_ends_when_nobody_listens_any_more(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It went on for 19 s after its node was killed, and ended with exit code 0."""
+    heard = probe.listen('geometry_msgs/msg/Twist', '/gone/cmd_vel')
+    passed = [0.0]
+    monkeypatch.setattr(commands, 'listeners', lambda node, topic: () if passed[-1] > 0.5 else (
+        Endpoint('/a', 'geometry_msgs/msg/Twist', True, False),))
+    tool = Tool('lg_husky_driver', Orderly())
+    try:
+        with pytest.raises(CommandError, match='/gone/cmd_vel: nobody listens any more, after '):
+            drive(tool, Manoeuvre('long', (Step(20.0, 0.5, 0.0),)),
+                  make_settings(command_topic='/gone/cmd_vel'), progress=passed.append)
+    finally:
+        tool.close()
+    assert passed[-1] < 5.0
+    assert probe.until(lambda: len(heard) == len(passed) + commands.ZEROS)
+    assert [one.linear.x for one in heard[-commands.ZEROS:]] == [0.0] * commands.ZEROS
