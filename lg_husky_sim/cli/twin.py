@@ -51,7 +51,7 @@ def command(model: Path, plain: Path | None, preset: str | None, namespace: str 
     from lg_husky_sim.husky.model import compile_model
     from lg_husky_sim.husky.model_file import load_model, nominal_of
     from lg_husky_sim.ros.tool import Ended
-    from lg_husky_sim.ros.twin import NAME, Twin
+    from lg_husky_sim.ros.twin import NAME, SILENCE, Twin
 
     own = load_model(model)
     files = {'plain': nominal_of(own) if plain is None else load_model(plain), 'model': own}
@@ -63,7 +63,10 @@ def command(model: Path, plain: Path | None, preset: str | None, namespace: str 
         try:
             while seconds is None or time.monotonic() - begun < seconds:
                 twin.spin(every)
-                click.echo(f'{time.monotonic() - begun:7.1f} s  {_errors(twin, "now")}')
+                silent = twin.silence > max(SILENCE, every)
+                now = (f'nothing received for {twin.silence:.1f} s' if silent
+                       else _errors(twin, 'now'))
+                click.echo(f'{time.monotonic() - begun:7.1f} s  {now}')
         except Ended:
             click.echo('')
         finally:

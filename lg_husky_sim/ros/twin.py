@@ -19,7 +19,7 @@ from lg_husky_sim.ros.tool import Tool
 from lg_husky_sim.signals import BodyTwist
 
 NAME = 'lg_husky_twin'
-__all__ = ['NAME', 'QUANTITIES', 'RunningError', 'Shadow', 'Sides', 'Twin']
+__all__ = ['NAME', 'QUANTITIES', 'SILENCE', 'RunningError', 'Shadow', 'Sides', 'Twin']
 
 #: Finds the wheels of both sides in a joint state: names and values to left and right.
 Sides = Callable[[Sequence[str], Sequence[float]], tuple[float, float]]
@@ -65,6 +65,7 @@ class Twin:
         self._true_pose = pose_topic is not None
         self._posed = False
         self._first = math.nan
+        self._arrived = math.nan
         self._measured: dict[str, tuple[float, ...]] = {}
         self.shadows = {name: Shadow(plant, settings)
                         for name, plant in plants.items()}
@@ -88,7 +89,7 @@ class Twin:
 
     def _stamp(self, header: Any) -> float:
         # The robot's time [s] of a message; that of its arrival where it has no stamp.
-        arrival = time.monotonic()
+        self._arrived = arrival = time.monotonic()
         stamp = stamp_nanoseconds(header.stamp) * 1e-9
         if stamp == 0.0 and not self._clock.now(arrival) >= 0.0:
             stamp = arrival
@@ -151,11 +152,18 @@ class Twin:
             for shadow in self.shadows.values():
                 shadow.gyro(moment, rate)
 
+    @property
+    def silence(self) -> float:
+        """Time since the robot's last joint states or IMU [s]; NaN before the first."""
+        return time.monotonic() - self._arrived
+
     def spin(self, seconds: float) -> None:
-        """Serve callbacks for some time [s], then publish the running errors."""
+        """Serve callbacks for some time [s], then publish the running errors if there are new."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             self._tool.serve()
+        if self.silence > max(SILENCE, seconds):
+            return
         for (name, quantity), publisher in self._publishers.items():
             value = self.shadows[name].errors[quantity].now
             if math.isfinite(value):
