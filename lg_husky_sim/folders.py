@@ -27,6 +27,7 @@ def check_folder(path: Path) -> None:
     ------
     SettingsError
         If something else is there, or nothing can be written there.
+
     """
     if (path.exists() or path.is_symlink()) and not path.is_dir():
         raise SettingsError(f'{path} exists and is not a folder; choose another name')
@@ -54,6 +55,7 @@ def check_ours(path: Path, beginning: str) -> None:
     ------
     SettingsError
         If something else is there.
+
     """
     if path.is_dir():
         raise SettingsError(f'{path} is a folder; choose another name')
@@ -81,6 +83,7 @@ def check_marked(path: Path, mark: str) -> None:
     ------
     SettingsError
         If something else is there.
+
     """
     if path.is_file() and mark.encode() in path.read_bytes():
         return
@@ -106,6 +109,7 @@ def scratch_beside(path: Path) -> Iterator[Path]:
     ------
     OSError
         If nothing can be written there; it names `path`, not the scratch folder.
+
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -141,6 +145,7 @@ def result_folder(path: Path, marker: str) -> Iterator[Path]:
     ------
     SettingsError
         If something else is at `path`, or a recording, or nothing can be written there.
+
     """
     target = path.resolve()
     check_folder(target)

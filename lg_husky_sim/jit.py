@@ -50,6 +50,7 @@ class Kernel:
         Name of a module that puts the machine code on disk when it is run. Where there is none
         yet, calls do not wait for it: they run in plain Python meanwhile, unless that takes so
         long that they had better waited.
+
     """
 
     def __init__(self, function: Callable[..., Any], compiler: str = '') -> None:
@@ -103,6 +104,7 @@ class Kernel:
         -------
         threading.Event
             Set from when on calls run in machine code.
+
         """
         with _MAKING:
             if self._ready is None:
@@ -244,6 +246,7 @@ def forget_outdated(indices: list[Path], newest: float) -> None:
         Index files of the cache.
     newest : float
         Time of the last change of a source [s since the epoch].
+
     """
     for index in indices:
         try:

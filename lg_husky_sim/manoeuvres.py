@@ -88,6 +88,7 @@ class Step:
     ------
     CommandError
         If a number is not finite, the duration is not positive or the ramp is longer.
+
     """
 
     duration: float
@@ -131,6 +132,7 @@ class Manoeuvre:
     ------
     CommandError
         If there is no step, or rate and length are out of range.
+
     """
 
     name: str
@@ -162,6 +164,7 @@ class Manoeuvre:
         TimeSeries
             Names forward [m/s] and yaw [rad/s]; times [s] from 0 at the script's rate, and a
             last one at the end, so that the series is as long as the script.
+
         """
         count = math.ceil(self.duration * self.rate - 1e-9)
         times = np.append(np.arange(count) / self.rate, self.duration)
@@ -186,6 +189,7 @@ def checked_rate(rate: object) -> float:
     ------
     CommandError
         If it is not positive or too high.
+
     """
     if not isinstance(rate, Real) or not 0.0 < float(rate) <= LARGEST_RATE:
         said = f'{float(rate):g}' if isinstance(rate, Real) else shown(rate)
@@ -221,6 +225,7 @@ def load_manoeuvre(path: Path) -> Manoeuvre:
     CommandError
         If it cannot be read as a script; the message names file, place, value and what is
         allowed.
+
     """
     try:
         data = read_yaml(path, CommandError)
@@ -238,6 +243,7 @@ def find_manoeuvre(name: str) -> Manoeuvre:
     ------
     CommandError
         If there is none of that name; the message lists those there are.
+
     """
     known = builtin_manoeuvres()
     if name not in known:

@@ -61,6 +61,7 @@ def map_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
         LG_HUSKY_BACKEND cannot be understood.
     MissingExtraError
         If a cluster is named and Dask or Ray is not installed.
+
     """
     name, address = ('dask', scheduler) if scheduler is not None else _backend_of_environment()
     if name == 'processes' and (jobs <= 1 or len(tasks) <= 1):
@@ -94,6 +95,7 @@ def run_tasks(function: Callable[[Task], Outcome], tasks: Sequence[Task], jobs: 
     -------
     list
         In the order of the tasks.
+
     """
     done = []
     for outcome in map_tasks(function, tasks, jobs, scheduler):

@@ -26,6 +26,7 @@ def numbers(file: str, schema: str) -> Mapping[str, float]:
     ------
     SettingsError
         If the file is not one of these.
+
     """
     path = config_path(file)
     data = read_yaml(path, SettingsError)

@@ -26,6 +26,7 @@ class BodyTwist:
         Forward speed [m/s], positive ahead.
     yaw : float
         Yaw rate [rad/s], positive counter-clockwise (to the left).
+
     """
 
     forward: float = 0.0
@@ -43,6 +44,7 @@ class Pose:
         Position [m].
     heading : float
         Angle of the base's x axis against the frame's [rad], not wrapped.
+
     """
 
     x: float = 0.0
@@ -74,6 +76,7 @@ class TimeSeries:
     ------
     RecordingError
         If shapes do not agree, or stamps are not finite or go backwards.
+
     """
 
     times: FloatArray = field()
@@ -114,6 +117,7 @@ class TimeSeries:
         ------
         RecordingError
             If there is no such channel.
+
         """
         if name not in self.names:
             raise RecordingError(f'no channel {name!r}; there are {", ".join(self.names)}')
@@ -138,6 +142,7 @@ class TimeSeries:
         ------
         MissingExtraError
             If pandas is not installed.
+
         """
         require('pandas', 'make a DataFrame')
         import pandas as pd
@@ -159,6 +164,7 @@ class TimeSeries:
         Returns
         -------
         matplotlib Axes
+
         """
         require('matplotlib', 'draw figures')
         if ax is None:

@@ -23,6 +23,7 @@ class Threads(ThreadPoolExecutor):
     ----------
     jobs : int
         How many; at least one.
+
     """
 
     def __init__(self, jobs: int) -> None:

@@ -97,6 +97,7 @@ def yaml_text(data: object, flow: bool | None = False) -> str:
     Returns
     -------
     str
+
     """
     return str(yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True,
                          default_flow_style=flow))

@@ -21,6 +21,7 @@ class CircleFollower:
         [m]
     speed : float
         [m/s], positive for counter-clockwise.
+
     """
 
     def __init__(self, x: float, y: float, radius: float, speed: float) -> None:

@@ -32,6 +32,7 @@ def axes_or_new(axes: Any, grid: tuple[int, int], what: str, size: tuple[float, 
     ------
     ParameterError
         If another number of axes is given.
+
     """
     require('matplotlib', 'draw figures')
     count = grid[0] * grid[1]

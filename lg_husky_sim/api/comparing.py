@@ -60,6 +60,7 @@ class Comparison:
         Time after which each prediction started anew [s]; 0 only at gaps.
     settings : mapping of str to float
         Parameters that were overridden in every model.
+
     """
 
     outcomes: tuple[RecordingOutcome, ...]
@@ -122,6 +123,7 @@ class Comparison:
         Returns
         -------
         numpy.ndarray of matplotlib Axes, shape (4,)
+
         """
         from lg_husky_sim.comparison.traces import traces_of
         from lg_husky_sim.reporting.pictures import draw_path, draw_signal
@@ -158,6 +160,7 @@ class Comparison:
         -------
         pathlib.Path
             The page.
+
         """
         from lg_husky_sim.comparison.page import MARKER, PAGE, report_data, write_files
         from lg_husky_sim.reporting.provenance import provenance
@@ -197,6 +200,7 @@ class Comparison:
         -------
         pathlib.Path
             The folder.
+
         """
         from lg_husky_sim.comparison.signals_bag import write_comparison_bag
         return write_comparison_bag(Path(path), self.outcomes[recording], overwrite)
@@ -213,6 +217,7 @@ class Comparison:
         Returns
         -------
         tuple of pathlib.Path
+
         """
         from lg_husky_sim.comparison.signals_bag import write_trajectories
         return tuple(path for outcome in self.outcomes
@@ -271,6 +276,7 @@ def compare(recordings: Recordings, models: Models = None, *, rivals: Recordings
         each recording.
     RecordingError
         If there is no recording, or one cannot be used.
+
     """
     horizon = _checked_horizon(horizon)
     recordings, rivals = given(recordings), listed(rivals)

@@ -65,6 +65,7 @@ class StepResponse:
         What it is without, as it is not linear; '' for nothing.
     notes : str
         Which outputs have no steady state, and why, and what else to know; '' for nothing.
+
     """
 
     times: FloatArray
@@ -95,6 +96,7 @@ class StepResponse:
         ------
         ParameterError
             If there is no such output.
+
         """
         if name not in self.names:
             raise ParameterError(f'no output {name!r}{suggestion(name, self.names)}')
@@ -135,6 +137,7 @@ class StepResponse:
         ------
         ParameterError
             If there are not as many axes as outputs.
+
         """
         count = len(self.names)
         found = axes_or_new(axes, (count, 1), f'a step response of {count} outputs',
@@ -187,6 +190,7 @@ class FrequencyResponse:
         Name, angular frequency [rad/s], gain [dB] and phase [deg] of the largest gain, where it
         is between the ends, and of the bandwidth: 3 dB below the gain at rest. From poles and
         zeros, whatever lies between the rates given.
+
     """
 
     rates: FloatArray
@@ -239,6 +243,7 @@ class FrequencyResponse:
         ------
         ParameterError
             If there are not two axes.
+
         """
         found = axes_or_new(axes, (2, 1), 'a frequency response', (7.0, 5.4), share=True)
         from matplotlib.ticker import MultipleLocator

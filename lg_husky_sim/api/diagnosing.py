@@ -48,6 +48,7 @@ class DiagnosisResult:
         The model in doubt.
     baseline : tuple of Recording
         Recordings before a change.
+
     """
 
     case: Case | ChangeCase
@@ -116,6 +117,7 @@ class DiagnosisResult:
         -------
         Table
             The last column has the change to the last model, marked as better or worse.
+
         """
         from lg_husky_sim.diagnosis.error_tables import error_tables
         from lg_husky_sim.reporting.page import change_words, error_cells
@@ -165,6 +167,7 @@ class DiagnosisResult:
         Returns
         -------
         numpy.ndarray of matplotlib Axes, shape (4,)
+
         """
         return self.compare().plot(axes, recording)
 
@@ -188,6 +191,7 @@ class DiagnosisResult:
         -------
         pathlib.Path
             The report, or diagnosis.json without one.
+
         """
         from lg_husky_sim.diagnosis.output import MARKER, write_files
         from lg_husky_sim.reporting.provenance import provenance

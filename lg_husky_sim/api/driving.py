@@ -50,6 +50,7 @@ def driven(plant: Plant, values: Mapping[str, float], commands: Drive, rate: flo
         If the commands cannot be used, or the rate is too low for two samples.
     RecordingError
         If the recording cannot be read or has no commands.
+
     """
     if rate is not None:
         checked_rate(rate)
@@ -85,6 +86,7 @@ def fastest_side(commands: TimeSeries, values: Mapping[str, float]) -> float:
         Names forward [m/s] and yaw [rad/s].
     values : mapping of str to float
         Parameters of the model: turn_ratio is needed.
+
     """
     if not len(commands):
         return 0.0

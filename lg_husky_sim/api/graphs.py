@@ -57,6 +57,7 @@ class Graph(Responses):
         What to say of the matrices.
     source : str
         File that it comes from, for messages.
+
     """
 
     def __init__(self, name: str, graph: LinearGraph, values: Mapping[str, float],
@@ -146,6 +147,7 @@ class Graph(Responses):
         ------
         ParameterError
             If a parameter is unknown, has no number, or one that is not allowed.
+
         """
         with self._in_file():
             model = compile_numeric(self.graph, self.outputs, chained=True)
@@ -169,6 +171,7 @@ class Graph(Responses):
         ----------
         by_parameter : bool
             Write the parameters' expressions instead of the elements' names.
+
         """
         from lg_husky_sim.linear_graph.equations import equations
         from lg_husky_sim.linear_graph.report import text_report
@@ -189,6 +192,7 @@ class Graph(Responses):
         ----------
         by_parameter : bool
             Write the parameters' expressions instead of the elements' names.
+
         """
         from lg_husky_sim.linear_graph.equations import equations
         from lg_husky_sim.linear_graph.report import latex_report
@@ -220,6 +224,7 @@ class Graph(Responses):
         Returns
         -------
         pathlib.Path
+
         """
         from lg_husky_sim.linear_graph.drawing import save_picture
 
@@ -247,6 +252,7 @@ class Graph(Responses):
             If the ending is unknown, or the format cannot hold the model.
         ParameterError
             If a parameter has no number.
+
         """
         from lg_husky_sim.linear_graph.export import check_export, export
 
@@ -324,6 +330,7 @@ def graph(source: str | os.PathLike[str] | dict[str, Any] | LinearGraph,
         If the graph cannot be built.
     TypeError
         If the source is of another type.
+
     """
     if not isinstance(source, str | os.PathLike | LinearGraph | dict):
         raise TypeError(f'lg.graph takes a netlist file, the text or the dict of one, or a '

@@ -45,6 +45,7 @@ class Fit:
         The model as it was given.
     sources : tuple of (str, str)
         Name and path of each recording.
+
     """
 
     result: FitResult
@@ -118,6 +119,7 @@ class Fit:
         Returns
         -------
         matplotlib Axes
+
         """
         require('matplotlib', 'draw figures')
         from lg_husky_sim.reporting.pictures import draw_intervals
@@ -146,6 +148,7 @@ class Fit:
         ------
         SettingsError
             If the name cannot be used.
+
         """
         return write_fit(self.result, self.segments, self.before.model, Path(path),
                          provenance(self.sources), self.what_to_change.advice())

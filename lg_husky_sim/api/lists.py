@@ -31,6 +31,7 @@ def list_effects(name: str | None = None, model: PathLike | Husky | None = None)
     ------
     ParameterError
         If there is no effect of that id; a near one is suggested.
+
     """
     if name is None:
         return Table('', ('effect', 'part', 'what it is', 'sides', 'forms'), tuple(
@@ -57,6 +58,7 @@ def list_manoeuvres() -> Table:
     -------
     Table
         With ``to_pandas()``; printed as text.
+
     """
     return Table('', ('manoeuvre', 'length [s]', 'fastest [m/s]', 'fastest turn [rad/s]',
                       'what it is'), tuple(

@@ -51,6 +51,7 @@ def shown(progress: Shown, known: bool = True) -> Iterator[Report]:
     ------
     callable
         To be told the stage and the share.
+
     """
     if callable(progress):
         yield progress
@@ -87,6 +88,7 @@ class Lines:
         Takes a line.
     brief : float
         Stages that end within this time from the beginning get no line [s].
+
     """
 
     def __init__(self, write: Callable[[str], object], brief: float = 0.0) -> None:

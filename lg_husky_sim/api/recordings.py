@@ -105,6 +105,7 @@ class Recording(rec.Recording):
         Survey
             Streams with rates and gaps, repairs of the clock, excitation, which parameters the
             drive can determine, and what is missing for a diagnosis.
+
         """
         from lg_husky_sim.api.surveys import survey
         return survey(self, model)
@@ -118,6 +119,7 @@ class Recording(rec.Recording):
         pandas.DataFrame
             Index ``time`` [s], columns such as ``wheels.left``; NaN where a stream has no sample
             at a time.
+
         """
         require('pandas', 'make a DataFrame')
         import pandas as pd
@@ -142,6 +144,7 @@ class Recording(rec.Recording):
         Returns
         -------
         numpy.ndarray of matplotlib Axes, shape (4,)
+
         """
         axes = axes_or_new(axes, (2, 2), 'a recording', (10.0, 6.0))
         prefix = f'{label} ' if label else ''
@@ -188,6 +191,7 @@ class Recording(rec.Recording):
         ------
         RecordingError
             If something is at `path` already.
+
         """
         frames = self.frames if self.frames[0] else ('odom', 'base_link')
         return rec.write_recording(path, self.streams, storage=storage, start_ns=self.start_ns,
@@ -213,6 +217,7 @@ class Recording(rec.Recording):
             If the recording has no pose.
         SettingsError
             If something else is there.
+
         """
         from lg_husky_sim.recording.tum import write_tum
         return write_tum(path, self.pose, self.start_ns)
@@ -273,6 +278,7 @@ def read(path: PathLike, *, topics: Topics = None) -> Recording:
     ------
     RecordingError
         If there is no usable bag; the message says why.
+
     """
     bags = bags_in(_place(path))
     if len(bags) > 1:
@@ -305,6 +311,7 @@ def read_all(source: Recordings, *, topics: Topics = None, progress: Report | No
     ------
     RecordingError
         If one of them is no usable bag.
+
     """
     chosen = topic_map(topics)
     several = listed(source)
@@ -327,6 +334,7 @@ def given(source: Recordings) -> list[Path | rec.Recording]:
     ------
     RecordingError
         If there is none, or a path does not exist.
+
     """
     found = listed(source)
     if not found:
@@ -342,6 +350,7 @@ def check_count(name: str, value: object) -> None:
     ------
     CommandError
         If fewer than one.
+
     """
     if not isinstance(value, Integral) or value < 1:
         raise CommandError(f'{name} = {shown(value)}: at least 1 is needed')
@@ -355,6 +364,7 @@ def listed(source: Recordings) -> list[Path | rec.Recording]:
     ------
     RecordingError
         If a path does not exist.
+
     """
     several: Iterable[PathLike | rec.Recording] = source if isinstance(
         source, Iterable) and not isinstance(source, str) else [source]

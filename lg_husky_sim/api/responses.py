@@ -83,6 +83,7 @@ class Responses(ABC):
             If an input is differentiated.
         ParameterError
             If a parameter is unknown, has no number, or one that is not allowed.
+
         """
         from lg_husky_sim.linear_graph.nonlinear import RightHandSide
         with self._in_file():
@@ -123,6 +124,7 @@ class Responses(ABC):
         ParameterError
             In numbers, if a parameter has no number or one that is not allowed, or
             `by_parameter` is asked for.
+
         """
         output, source = self._names(output, source)
         if by_parameter and (numbers or values):
@@ -179,6 +181,7 @@ class Responses(ABC):
             If an output begins with an impulse, as it has the step's derivative in it.
         ParameterError
             If the times are not equally spaced from 0, or a parameter has no number.
+
         """
         from lg_husky_sim.linear_graph.modes import StepFigures
         from lg_husky_sim.linear_graph.transfer import (
@@ -237,6 +240,7 @@ class Responses(ABC):
         ------
         ParameterError
             If there is a pole at one of the frequencies, or a parameter has no number.
+
         """
         from lg_husky_sim.linear_graph.resonances import Factors, usual_rates
         from lg_husky_sim.linear_graph.transfer import (

@@ -53,6 +53,7 @@ class Husky(Graph):
         If the file cannot be read as a model.
     ParameterError
         If a setting is unknown or out of bounds.
+
     """
 
     path: str
@@ -147,6 +148,7 @@ class Husky(Graph):
         ------
         ParameterError
             If the effect, its side or shape, or a number is unknown or out of bounds.
+
         """
         added = Effect(effect, side, shape)
         structure = self.model.in_proportion().structure.with_effect(added)
@@ -183,6 +185,7 @@ class Husky(Graph):
             If the commands cannot be used.
         RecordingError
             If the recording cannot be read or has no commands.
+
         """
         return driven(self.plant, self.parameters, commands, rate, topics)
 
@@ -237,6 +240,7 @@ class Husky(Graph):
             If there is no recording, or one cannot be used.
         CommandError
             If starts or jobs are fewer than one.
+
         """
         from lg_husky_sim.api.identifying import identify
         return identify(self, recordings, free, effects=effects, method=method,
@@ -273,6 +277,7 @@ class Husky(Graph):
             If jobs are fewer than one.
         DiagnosisError
             If the recordings cannot be those of a Husky.
+
         """
         from lg_husky_sim.api.diagnosing import diagnose
         return diagnose(self, recordings, baseline=baseline, jobs=jobs,

@@ -27,6 +27,7 @@ def sensor_warnings(related: Sequence[Relation], model: ModelFile, nuisance: Col
         A fault that it has as an effect is none.
     nuisance : collection of str
         Unknowns of the recordings that are estimated: they are no faults either.
+
     """
     said = [one.statement for one in faults(related) if not _accounted(one, model, nuisance)]
     robot = 'the robot of the model' if other_robot(

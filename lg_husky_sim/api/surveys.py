@@ -84,6 +84,7 @@ class Survey:
     differs : bool
         Whether the robot is not one of the model, or off the ground: a diagnosis would say so,
         and look for no effect.
+
     """
 
     name: str

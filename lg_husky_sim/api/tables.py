@@ -41,6 +41,7 @@ class Table:
     columns : tuple of str
     rows : tuple of tuple
         Texts, numbers, booleans and tuples of texts; None where there is none.
+
     """
 
     title: str
@@ -113,6 +114,7 @@ def page_part(title: str, lines: Sequence[str], tables: Sequence[Table],
     tables : sequence of Table
     points : mapping of str to sequence of str, optional
         Lists by their heading; empty ones are left out.
+
     """
     parts = [f'<h4>{escape(title)}</h4>', *(f'<p>{escape(line)}</p>' for line in lines),
              *(table.html() for table in tables if table.rows)]

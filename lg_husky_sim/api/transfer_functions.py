@@ -44,6 +44,7 @@ class TransferFunction:
         [1/s], fastest first.
     left_out : str
         What it is without, as it is not linear; '' for nothing.
+
     """
 
     output: str

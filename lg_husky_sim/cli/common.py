@@ -45,6 +45,7 @@ class Output:
         One line a stage with its time, on a terminal too.
     opened : bool
         Open the page that was written.
+
     """
 
     as_json: bool = False
@@ -81,6 +82,7 @@ class Output:
             A Table, or what prints itself.
         data : object, optional
             The same as plain data; by default the table's.
+
         """
         from lg_husky_sim.api.tables import Table
 
@@ -123,6 +125,7 @@ def spoken(*, page: bool = False, data: bool = True) -> Callable[[Function], Fun
         Whether the verb writes a page that can be opened.
     data : bool
         Whether its result can be printed as JSON.
+
     """
     def decorate(function: Function) -> Function:
         @functools.wraps(function)
@@ -177,6 +180,7 @@ class Words(_TextType):
         Put behind a completed word, such as ``=``.
     files : bool
         Whether it may be a file as well.
+
     """
 
     name = 'text'

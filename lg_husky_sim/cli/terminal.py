@@ -24,6 +24,7 @@ def print_table(table: Table, console: Any) -> None:
         Columns in which nothing is known are left out.
     console : rich.console.Console
         Lines are longer than it is wide only where whole words do not fit side by side.
+
     """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table as Grid

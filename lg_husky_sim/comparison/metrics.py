@@ -32,6 +32,7 @@ class SquareSum:
         Sum of squares [unit²].
     count : int
         Number of samples.
+
     """
 
     total: float = 0.0
@@ -58,6 +59,7 @@ class Tracking:
         Stamps of the measured pose [s].
     measured, predicted : numpy.ndarray, shape (n, 2)
         x ahead and y to the left of the robot as it stood at the start [m].
+
     """
 
     times: FloatArray
@@ -101,6 +103,7 @@ def measured_channels(segment: Segment) -> dict[str, TimeSeries]:
     dict of str to TimeSeries
         Some of wheel_left, wheel_right, forward, yaw_rate, accel_x, heading, x, y; each series
         has that one channel.
+
     """
     streams = segment.streams
     found: dict[str, TimeSeries] = {}
@@ -135,6 +138,7 @@ def predicted_at(prediction: TimeSeries, name: str, times: FloatArray) -> FloatA
     -------
     numpy.ndarray, shape (n,)
         Interpolated; NaN outside the prediction.
+
     """
     if name not in prediction.names or not len(prediction):
         return np.full(times.size, np.nan)
@@ -161,6 +165,7 @@ def channel_pairs(segment: Segment, prediction: TimeSeries
     -------
     dict of str to tuple of numpy.ndarray, shape (n,)
         Times [s], measured and predicted values by channel; what is not predicted is NaN.
+
     """
     from_pose = pose_rates(segment, prediction)
     found = {}
@@ -186,6 +191,7 @@ def channel_errors(segment: Segment, prediction: TimeSeries) -> dict[str, Square
     dict of str to SquareSum
         Keys in the order of ``UNITS``; wheel_speed pools both sides, position both axes (its
         root mean square is that of the distance).
+
     """
     sums = {name: _square_sum(measured - predicted) for name, (_, measured, predicted)
             in channel_pairs(segment, prediction).items()}
@@ -226,6 +232,7 @@ def tracking(segment: Segment, prediction: TimeSeries) -> Tracking:
     ------
     RecordingError
         If the segment has no pose.
+
     """
     if 'pose' not in segment.streams:
         raise RecordingError(

@@ -26,6 +26,7 @@ class NamedPlant:
     model : ModelFile
         As read, with the settings applied.
     plant : Plant
+
     """
 
     label: str
@@ -59,6 +60,7 @@ def load_plants(
         If a file cannot be read as a model.
     ParameterError
         If a setting is unknown or out of bounds.
+
     """
     places = tuple(paths) or (default_model_path(),)
     return tuple(_named(label, place, settings or {})
@@ -95,6 +97,7 @@ def plants_in(
     Returns
     -------
     tuple of NamedPlant
+
     """
     found = []
     for named in plants:

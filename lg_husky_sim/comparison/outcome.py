@@ -45,6 +45,7 @@ class SegmentOutcome:
         By label, then by channel.
     tracks : mapping of str to Tracking
         By label; empty without a recorded pose.
+
     """
 
     segment: Segment
@@ -114,6 +115,7 @@ def compare_recording(
         If it has no commands, or the rival recorded nothing in any of its segments.
     CommandError
         If it has no segment to compare.
+
     """
     recording.stream('command')
     parts = segments(recording)
@@ -183,6 +185,7 @@ def text_table(outcomes: Sequence[RecordingOutcome]) -> str:
     -------
     str
         Lines of at most some 100 characters for up to five models.
+
     """
     names = labels(outcomes)
     width = max(10, *(len(name) for name in names)) + 2

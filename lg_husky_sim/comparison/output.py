@@ -58,6 +58,7 @@ def simulate_recording(
         If it has no commands.
     CommandError
         If it has no segment to drive.
+
     """
     recording.stream('command')
     parts, _ = driven_segments(recording)
@@ -95,6 +96,7 @@ def simulate_commands(
     -------
     dict of str to TimeSeries
         As `simulate_recording` returns them.
+
     """
     start, end = float(commands.times[0]), float(commands.times[-1])
     steps = max(1, int(np.ceil(1.0 / (rate * PERIOD) - 1e-9)))

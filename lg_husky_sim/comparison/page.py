@@ -70,6 +70,7 @@ def write_files(
     ------
     MissingExtraError
         If matplotlib or jinja2 is not installed.
+
     """
     (folder / 'compare.txt').write_text(text, encoding='utf-8')
     (folder / MARKER).write_text(
@@ -97,6 +98,7 @@ def report_data(
     Returns
     -------
     ReportData
+
     """
     columns = labels(outcomes)
     parts: list[Predicted] = [(part.segment, part.predictions) for outcome in outcomes

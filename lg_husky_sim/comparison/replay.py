@@ -39,6 +39,7 @@ class InitialState:
         Left and right [rad/s]; None where no wheel speeds were recorded.
     wheel_angles : tuple of float
         Left and right [rad]; zeros where not recorded.
+
     """
 
     pose: Pose
@@ -69,6 +70,7 @@ def initial_state(segment: Segment, plant: Plant, window: float = WINDOW) -> Ini
     Returns
     -------
     InitialState
+
     """
     streams, start = segment.streams, segment.start
     forward = yaw = 0.0
@@ -124,6 +126,7 @@ def replay(
     TimeSeries
         The simulator's columns as its sensors read them, from the segment's start to its end: at
         every step, and exact at every stamp of the segment's streams.
+
     """
     plant = plant.in_recording(segment.recording)
     at = start or initial_state(segment, plant)

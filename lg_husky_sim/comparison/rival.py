@@ -44,6 +44,7 @@ def rival_prediction(rival: Recording, recording: Recording, segment: Segment) -
     ------
     RecordingError
         If the rival recorded nothing during the segment.
+
     """
     shift = clock_shift(rival, recording)
     count = int(np.floor((segment.end - segment.start) / PERIOD)) + 2
@@ -84,6 +85,7 @@ def clock_shift(rival: Recording, recording: Recording) -> float:
     ------
     RecordingError
         If the clocks differ and one of the two has no commands to align them by.
+
     """
     absolute = (rival.start_ns - recording.start_ns) * 1e-9
     if -rival.duration < absolute < recording.duration:

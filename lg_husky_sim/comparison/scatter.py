@@ -32,6 +32,7 @@ def scatter_of(times: FloatArray, forward: FloatArray) -> float:
         Standard deviation by the second differences of values that share no sample of the pose,
         ``median |d2 v| / (0.6745 sqrt 6)`` [m/s]: that of the noise, if the speed itself hardly
         bends within three windows. Not a number if there are too few.
+
     """
     if times.size < 2:
         return math.nan
@@ -61,6 +62,7 @@ def scatter_notes(segments: Sequence[Segment], least: float) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
+
     """
     found = {}
     for name in dict.fromkeys(one.recording for one in segments):

@@ -48,6 +48,7 @@ def write_comparison_bag(path: Path, outcome: RecordingOutcome, overwrite: bool 
         If something is at `path` already.
     SettingsError
         If a file of another origin has the name of a layout.
+
     """
     layouts = beside(path, '.foxglove.json'), beside(path, '.plotjuggler.xml')
     if not path.exists():  # beside such a bag, they are the bag's
@@ -111,6 +112,7 @@ def comparison_signals(outcome: RecordingOutcome
     Returns
     -------
     signals, poses : dict of str to TimeSeries
+
     """
     names = topic_names(outcome)
     signals: dict[str, list[TimeSeries]] = {}

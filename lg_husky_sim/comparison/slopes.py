@@ -40,6 +40,7 @@ def local_fit(
     -------
     value, slope : numpy.ndarray, shape (n_channels,)
         Value at `time` and its change per second; with a single row, that row and zeros.
+
     """
     first = time if ahead else time - 0.5 * window
     part = series.slice(first, first + window)
@@ -87,6 +88,7 @@ def body_rates(pose: TimeSeries, window: float = WINDOW) -> TimeSeries:
     TimeSeries
         Names forward [m/s] and yaw_rate [rad/s] at the pose's stamps, those within half a
         window of either end left out.
+
     """
     inside = ((pose.times >= pose.times[0] + 0.5 * window)
               & (pose.times <= pose.times[-1] - 0.5 * window)) if len(pose) else np.zeros(0, bool)
@@ -113,6 +115,7 @@ def without_spikes(pose: TimeSeries) -> TimeSeries:
     TimeSeries
         Without the rows whose position is farther from the median of the seven around them than
         0.2 m and than five times the median distance.
+
     """
     middle = median_filter(pose.values[:, :2], size=(NEIGHBOURS, 1), mode='nearest')
     distance = np.hypot(*(pose.values[:, :2] - middle).T)

@@ -48,6 +48,7 @@ def traces_of(parts: Sequence[Predicted], columns: Sequence[str]) -> tuple[Trace
         Recording by recording, the channels that were measured; segments follow each other with
         a gap in between. x is ahead and y to the left of the robot as it stood at the start of
         the recording's first segment, and their errors so at the start of each segment.
+
     """
     found = []
     for name in dict.fromkeys(segment.recording for segment, _ in parts):
@@ -143,6 +144,7 @@ def error_table(title: str, parts: Sequence[Predicted], columns: Sequence[str], 
     Returns
     -------
     ErrorTable
+
     """
     sums = {name: pooled(channel_errors(segment, predictions[name])
                          for segment, predictions in parts if name in predictions)
@@ -182,6 +184,7 @@ def change_intervals(parts: Sequence[Predicted], before: str, after: str
     dict of str to (float, float)
         Factors by channel, from resampling blocks of :data:`BLOCK`, within which errors may be
         correlated as they like; without channels that have one block only.
+
     """
     sums: dict[str, list[FloatArray]] = {}
     for segment, predictions in parts:

@@ -40,6 +40,7 @@ class CommercialBase:
         A linear graph that runs like it.
     values : mapping of str to float
         Parameters of the base, as in ``config/before_after.yaml`` [units there].
+
     """
 
     model: ModelFile
@@ -79,6 +80,7 @@ def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
     -------
     CommercialBase or None
         None where nothing is long enough, or not driven.
+
     """
     nominal = nominal.in_proportion()
     known = settings().of(nominal.structure.robot)

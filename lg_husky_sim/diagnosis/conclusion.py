@@ -53,6 +53,7 @@ def estimates(fit: Fit, names: Sequence[str], units: Parameters) -> tuple[Estima
     tuple of Estimate
         Intervals from the curvature of the cost, priors included, inside the bounds; without the
         numbers that are not determined: their intervals are the bounds of the search.
+
     """
     return tuple(
         _estimate(unknown, place, half, units.entry(unknown.name).unit)
@@ -99,6 +100,7 @@ def without_undetermined(evidence: Evidence, fit: Fit) -> Point:
         Numbers of the robot are nominal there. One that cannot be so, because the data are
         explained worse then than at the end of a 95 % interval or because there is no such
         model, stays as it was fitted.
+
     """
     point = fit.point
     idle = {p.name: neutral_of(p) for e in point.structure.effects for p in e.parameters()}
@@ -196,6 +198,7 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     Returns
     -------
     Answer
+
     """
     needed = needed_evidence(rest, free)
     rest, free = felt(rest, free, search.final.point.structure.robot)
@@ -255,6 +258,7 @@ def explained_by(search: Search) -> float:
     float
         What they gain under the noise that remains with them [nats], over the robot as it may be:
         its numbers stay within `most_tolerances` where they would do the effect's work.
+
     """
     evidence, plain = search.evidence, search.plain.point
     room = setting('most_tolerances')

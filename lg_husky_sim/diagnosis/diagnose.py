@@ -69,6 +69,7 @@ class Case:
         Smooth efforts in what the search leaves.
     features : Features
         That made the confidence.
+
     """
 
     diagnosis: Diagnosis
@@ -103,6 +104,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     ------
     RecordingError
         If any recording cannot be used, one is given twice, or the robot is never driven.
+
     """
     nominal = nominal.in_proportion()
     recordings, _ = named_apart(recordings, ())

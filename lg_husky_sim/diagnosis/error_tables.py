@@ -45,6 +45,7 @@ def with_nominal(diagnosis: Diagnosis, nominal: ModelFile, segments: Sequence[Se
     Returns
     -------
     Diagnosis
+
     """
     if diagnosis.nominal:
         return diagnosis
@@ -69,6 +70,7 @@ def error_tables(diagnosis: Diagnosis, changed: bool = False) -> tuple[ErrorTabl
         On held-out data, if there are any, and on all data; the last column only where
         something was added to the model, and the change is that to the last column. The nominal
         model alone where none describes the robot: a fit to that is no improvement.
+
     """
     how = ('' if changed or not diagnosis.refitted else
            ' The nominal model is not fitted; the others are fitted to the other half of the '
@@ -114,6 +116,7 @@ def with_details(tables: Sequence[ErrorTable], detailed: Sequence[ErrorTable]
     tuple of ErrorTable
         First the common ones, with the intervals of their changes and the further rows that
         the traces have, then the other detailed ones.
+
     """
     more = {one.title: one for one in detailed}
     merged = [_merged(table, more.pop(table.title)) if table.title in more else table

@@ -42,6 +42,7 @@ def errors(plant: Plant, segments: Sequence[Segment], names: Sequence[str] = ()
     dict of str to float
         position_rmse_m, yaw_rate_rmse [rad/s], wheel_speed_rmse [rad/s], forward_rmse [m/s],
         and the paper's bounds max_abs_x_m and max_abs_y_m; those that were measured.
+
     """
     parts: list[Mapping[str, SquareSum]] = []
     bounds: list[tuple[float, float]] = []
@@ -77,6 +78,7 @@ def split(segments: Sequence[Segment]) -> tuple[tuple[Segment, ...], tuple[Segme
         To fit: every other recording, or the first half of every segment of a single one.
     tuple of Segment
         To hold out.
+
     """
     names = list(dict.fromkeys(s.recording for s in segments))
     if len(names) > 1:
@@ -116,6 +118,7 @@ def held_out_errors(found: Search, parts: Sequence[Segment]
         Recalibrated on the other data only.
     dict of str to float
         With what was found, its numbers from the other data.
+
     """
     train, test = split(parts)
     drives = [ticked_as(d, found.evidence.drives) for d in map(drive_of, train) if d is not None]

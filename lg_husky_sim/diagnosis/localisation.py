@@ -58,6 +58,7 @@ class Missing:
     bursts : float
         Log evidence of an effort that bursts, over all drives [nats]; at the wheels, of rates that
         no command explains.
+
     """
 
     balance: str
@@ -84,6 +85,7 @@ def steady_knots(drive: Drive, count: int) -> np.typing.NDArray[np.bool_]:
     numpy.ndarray of bool, shape (count,)
         Not those under whose hats a command changes, which may have come late, or never; nor
         those at the start, with a state that nobody has measured.
+
     """
     knots = np.linspace(drive.start, drive.end, count)
     moved = np.max(np.abs(np.diff(drive.logged.values, axis=0)), axis=1) > setting('still_speed')
@@ -115,6 +117,7 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
     -------
     tuple of Missing
         For each drive and balance.
+
     """
     projection = Projection(fit)
     spacing = setting('effort_spacing')
@@ -174,6 +177,7 @@ def mismatches(evidence: Evidence, fit: Fit, subsystem: str | None) -> tuple[Mis
     -------
     tuple of Mismatch
         Strongest first.
+
     """
     found: list[Mismatch] = []
     width, strong, join = (setting(n) for n in (
@@ -247,6 +251,7 @@ def where_it_shows(evidence: Evidence, gain: FloatArray) -> str:
     -------
     str
         The regimes with the densest gain, densest first.
+
     """
     total = float(np.sum(gain))
     if total <= 0.0:

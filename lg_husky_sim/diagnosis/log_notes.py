@@ -28,6 +28,7 @@ def log_notes(drives: Sequence[Drive]) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
+
     """
     notes = []
     periods = [d.clock.period for d in drives if d.clock is not None]
@@ -61,6 +62,7 @@ def reading_notes(drives: Sequence[Drive], reading: Reading) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
+
     """
     notes, window = [], reading.get('wheel_window')
     rated = any(d.wheel_times.size and not d.counted for d in drives)

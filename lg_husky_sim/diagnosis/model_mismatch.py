@@ -39,6 +39,7 @@ class ModelMismatch:
         Its errors on data that it was not fitted to.
     everywhere : dict of str to float
         Its errors on all data.
+
     """
 
     finding: Finding
@@ -77,6 +78,7 @@ def model_mismatch(found: Sequence[Difference], search: Search, plain_out: Mappi
     Returns
     -------
     ModelMismatch
+
     """
     first = max(found, key=lambda one: one.certainty)
     base, out, everywhere = None, {}, {}

@@ -57,6 +57,7 @@ def left_over(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     -------
     tuple of Effort
         Smooth ones, those that repeat and those that swing, largest evidence first.
+
     """
     return tuple(sorted([*efforts(evidence, fit), *lines(evidence, fit), *swings(evidence, fit)],
                         key=lambda one: -one.evidence))
@@ -71,6 +72,7 @@ def needed_evidence(rest: Sequence[Effort], free: Sequence[Missing]) -> float:
     rest : sequence of Effort
     free : sequence of Missing
         Each balance is looked at for bursts.
+
     """
     return evidence_beyond_chance(len(rest) + len({m.balance for m in free}))
 
@@ -88,6 +90,7 @@ def remaining(search: Search) -> Search:
     Search
         With disturbances that may last as long as a robot stays at a place, where those of the
         search last as long as they may: what a floor does for seconds is no unknown effort.
+
     """
     longest = setting('longest_time')
     times = [value for name, value in search.evidence.noise.values.items()
@@ -117,6 +120,7 @@ def felt(rest: Sequence[Effort], free: Sequence[Missing], robot: RobotSize
     tuple of Effort
     tuple of Missing
         Those that somewhere reach the size from which their description in effects.yaml counts.
+
     """
     least = {balance: next(p.of(robot).negligible for p in descriptions()[name].parameters
                            if p.negligible)

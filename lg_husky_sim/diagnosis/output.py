@@ -57,6 +57,7 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
     -------
     str
         Headline, findings, competing effects, what cannot be told apart, errors before and after.
+
     """
     lines = [f'{headline(diagnosis, changed)} (confidence {diagnosis.confidence:.2f})',
              *(f'  warning: {text}' for text in diagnosis.warnings)]
@@ -116,6 +117,7 @@ def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,
     -------
     str
         Why there is no report, if one was asked for and cannot be made; empty otherwise.
+
     """
     diagnosis = with_nominal(case.diagnosis, case.nominal, case.segments)
     save_model(diagnosis.model, folder / 'model.yaml')

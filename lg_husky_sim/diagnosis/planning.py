@@ -50,6 +50,7 @@ class Rival:
     parameters : Parameters
     starts : tuple of mapping
         Sizes of its last effect from which a refit begins.
+
     """
 
     name: str
@@ -70,6 +71,7 @@ class Separation:
         Least evidence in favour of the truth, whichever of the two is true [nats].
     channel : str
         The channel that says most.
+
     """
 
     manoeuvre: Manoeuvre
@@ -100,6 +102,7 @@ def typical(name: str, structure: Structure, parameters: Parameters, side: str =
     ------
     ParameterError
         If the effect is unknown or does not fit the structure.
+
     """
     there = next((e for e in structure.effects if e.id == name and side in ('', e.side)
                   and not e.again), None)
@@ -151,6 +154,7 @@ def drives(speed: float, rate: float) -> tuple[Manoeuvre, ...]:
     -------
     tuple of Manoeuvre
         Each begins and ends at rest.
+
     """
     def script(name: str, about: str, *steps: tuple[float, float, float, float]) -> Manoeuvre:
         rest = Step(1.5, 0.0, 0.0)
@@ -206,6 +210,7 @@ def recorded(rival: Rival, manoeuvre: Manoeuvre) -> Drive:
     ------
     DiagnosisError
         If the drive is too short.
+
     """
     plant = compile_model(rival.structure).at(rival.parameters)
     commands = manoeuvre.commands()
@@ -239,6 +244,7 @@ def imitated(truth: Rival, other: Rival, manoeuvre: Manoeuvre) -> tuple[float, s
     ------
     DiagnosisError
         If the other one cannot be simulated.
+
     """
     drive = recorded(truth, manoeuvre)
     noise = Noise({name: other.structure.robot.factor(UNITS.get(name, '1')) * setting(
@@ -290,6 +296,7 @@ def plan(one: Rival, two: Rival, manoeuvres: Sequence[Manoeuvre],
     ------
     DiagnosisError
         If none could be simulated.
+
     """
     found = []
     for manoeuvre in manoeuvres:
@@ -322,6 +329,7 @@ def usual_speeds(parameters: Parameters) -> tuple[float, float]:
         Highest speed [m/s], which asks no more of a slower robot than of a Husky.
     float
         Highest yaw rate [rad/s], likewise.
+
     """
     husky = packaged().parameters
     forward, yaw, _ = speeds_of(parameters, husky) if other_robot(husky, parameters) else (
@@ -345,6 +353,7 @@ def named_drive(effects: Sequence[str], structure: Structure, parameters: Parame
     -------
     str
         Empty where no drive decides, or one of the two cannot be put into the model.
+
     """
     try:
         one, two = (typical(name, structure, parameters) for name in effects[:2])

@@ -59,6 +59,7 @@ class PredictionError:
     statement : str
     robot, simulator : tuple of str
         What to change there.
+
     """
 
     kind: str
@@ -109,6 +110,7 @@ class Assessment:
         Most serious first.
     compared : bool
         Whether any channel could be compared.
+
     """
 
     label: str
@@ -123,6 +125,7 @@ class Assessment:
         ----------
         where : str
             Put behind the headings, such as the name of a case.
+
         """
         remarks = _table()['remarks']
         behind = f', {where}' if where else ''
@@ -172,6 +175,7 @@ def assess(parts: Predicted, label: str, parameters: Parameters) -> Assessment:
     Returns
     -------
     Assessment
+
     """
     related = relations([segment for segment, _ in parts])
     accused: set[str] = set()

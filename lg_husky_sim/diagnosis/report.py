@@ -109,6 +109,7 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
     Returns
     -------
     Headline
+
     """
     found, sure = diagnosis.findings, ('Confidence', f'{100.0 * diagnosis.confidence:.0f} %')
     sentences = tuple(one.statement for one in found)
@@ -170,6 +171,7 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str], *,
     Returns
     -------
     tuple of Advice
+
     """
     robot: list[str] = []
     simulator: list[str] = []
@@ -348,6 +350,7 @@ def report_data(
     Returns
     -------
     ReportData
+
     """
     columns = tuple(name for name in (NOMINAL, RECALIBRATED, WITH_FINDING)
                     if any(name in table.columns for table in errors)

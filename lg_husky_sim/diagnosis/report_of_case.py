@@ -58,6 +58,7 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
     Returns
     -------
     ReportData
+
     """
     diagnosis = case.diagnosis
     plants = {NOMINAL: _plant(case.nominal)}
@@ -217,6 +218,7 @@ def new_terms(model: ModelFile, plain: Structure) -> list[str]:
     -------
     list of str
         One line for each new source's law, and for each state equation it enters.
+
     """
     graph, added = new_elements(plain, model.structure)
     regime = compile_model(model.structure).regimes[-1]

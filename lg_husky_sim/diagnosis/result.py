@@ -42,6 +42,7 @@ class Estimate:
     value, low, high : float
         Estimate and 95 % interval [unit].
     unit : str
+
     """
 
     name: str
@@ -88,6 +89,7 @@ class Finding:
     rivals : tuple of Rivalry
     statement : str
         One plain sentence with numbers.
+
     """
 
     effect: str
@@ -171,6 +173,7 @@ class Diagnosis:
     strained_plain, strained : tuple of Strained
         Parameters that are beyond their tolerances, in the recalibrated model and in the one
         with what was found.
+
     """
 
     verdict: Verdict
@@ -292,6 +295,7 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
     -------
     dict
         Numbers that are not finite are null.
+
     """
     return {
         'schema': SCHEMA,

@@ -25,6 +25,7 @@ def separated_by(effects: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ..
         Sensors that see one of them and not all in the same way.
     tuple of str
         Manoeuvres that bring one of them out.
+
     """
     kinds = [kind for kind in catalogue().values() if kind.id in effects]
     seen = [kind.sensors for kind in kinds]

@@ -32,6 +32,7 @@ class Strained:
         Distance from nominal in standard deviations of the prior.
     at_bound : bool
         Whether it ended at a bound of the parameter.
+
     """
 
     name: str
@@ -82,6 +83,7 @@ def strained(fit: Fit) -> tuple[Strained, ...]:
         Outside the central 95 % of the prior, or at a bound. None where a robot of these
         tolerances may well be so: of k parameters one is outside with a probability of up to
         0.05 k, so that the worst must be outside ``1 - 0.05/k`` (Bonferroni) or at a bound.
+
     """
     found = []
     point, beyond = fit.point, setting('two_sided')
@@ -117,6 +119,7 @@ def implausible_words(found: Sequence[Strained], added: bool) -> tuple[str, ...]
     Returns
     -------
     tuple of str
+
     """
     if not found:
         return ()

@@ -58,6 +58,7 @@ def sized(numbers: Sequence[Estimate]) -> tuple[Estimate, ...]:
     -------
     tuple of Estimate
         Intervals of amplitude and phase by propagation, cosine and sine taken as independent.
+
     """
     known = {one.name: one for one in numbers}
     found = list(numbers)

@@ -41,6 +41,7 @@ class Lag:
         On the commands that drive the channel.
     time_constant, delay : float
         [s]
+
     """
 
     gains: tuple[float, ...]
@@ -64,6 +65,7 @@ def driven(segment: FitSegment, channel: Channel, time_constant: float, delay: f
     -------
     numpy.ndarray, shape (n_values, n_inputs)
         Averages over the window for increments.
+
     """
     commands = segment.commands
     late = TimeSeries(commands.times + delay, commands.values, commands.names)
@@ -132,6 +134,7 @@ def fit_lags(data: Observations) -> dict[str, Lag]:
     -------
     dict of str to Lag
         By channel.
+
     """
     fitted = {}
     for name in data.channels:
@@ -170,6 +173,7 @@ class Kinematics:
         Half the track by which the base turns a yaw command into wheel rates [m].
     track : float
         Effective track by which wheel rates turn the robot [m].
+
     """
 
     radius: float
@@ -190,6 +194,7 @@ def fit_kinematics(data: Observations, parameters: Parameters) -> Kinematics:
     Returns
     -------
     Kinematics
+
     """
     radius, arm = parameters['wheel_radius'], 0.5 * parameters['track']
     if 'wheel_left' in data.channels:

@@ -46,6 +46,7 @@ def table(result: CaseResult) -> Table:
     Parameters
     ----------
     result : CaseResult
+
     """
     reference = paper().tracking_error
     rows = []
@@ -81,6 +82,7 @@ def parameter_table(result: CaseResult) -> Table:
     Parameters
     ----------
     result : CaseResult
+
     """
     rows = []
     fitted = result.fits[SQUARES].model.parameters
@@ -116,6 +118,7 @@ def verdict(result: CaseResult) -> list[str]:
     -------
     list of str
         Sentences made of the case's own numbers.
+
     """
     said = []
     held = [drive for drive in result.drives if drive.held_out]
@@ -179,6 +182,7 @@ def figures(result: CaseResult) -> tuple[tuple[Chart, ...], tuple[Drawing, ...]]
         Fig. 12.
     tuple of Drawing
         Named fig13 to fig16; further manoeuvres go on counting.
+
     """
     case = result.case.name
     shown = tuple(label for label in result.labels if label not in (NOMINAL, GIVEN))

@@ -38,6 +38,7 @@ class Case:
     rivals : mapping of str to Recording
         The engine's nominal run of the same commands, by manoeuvre.
     rival_label : str
+
     """
 
     name: str
@@ -54,6 +55,7 @@ def synthetic_case(seed: int) -> Case:
     Parameters
     ----------
     seed : int
+
     """
     config = engine_config()
     model = load_model()
@@ -78,6 +80,7 @@ def engine_case(seed: int) -> Case:
     Parameters
     ----------
     seed : int
+
     """
     config = engine_config()
     draws = np.random.default_rng(seed + 1)
@@ -122,6 +125,7 @@ def recorded_case(calibrate: Sequence[str], held_out: Sequence[str], rivals: Seq
         If the numbers do not agree.
     RecordingError
         If one cannot be read or is given twice.
+
     """
     if len(calibrate) != 1:
         raise CommandError(f'{len(calibrate)} recordings to calibrate on; give exactly one')
@@ -149,6 +153,7 @@ def sensed(name: str, commands: TimeSeries, truth: TimeSeries, draws: np.random.
     draws : numpy.random.Generator
     sensors : mapping
         Standard deviations: wheel, gyro, acceleration, position, heading.
+
     """
     shape = (len(truth), 1)
 

@@ -258,6 +258,7 @@ def read_columns(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     ------
     RecordingError
         If the file is no such table, or names anything that a table has no use for.
+
     """
     place = Path(path)
     try:
@@ -299,6 +300,7 @@ def numbers(column: NDArray[Any], name: str) -> NDArray[np.float64]:
     ------
     RecordingError
         If a cell is none.
+
     """
     return np.array([_number(cell, name) for cell in column], dtype=np.float64)
 

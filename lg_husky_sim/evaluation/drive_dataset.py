@@ -42,6 +42,7 @@ class DriveRun:
         As :func:`lg_husky_sim.recording.write_recording` takes them.
     start_ns : int
         Time zero [ns].
+
     """
 
     streams: Mapping[str, TimeSeries]
@@ -57,6 +58,7 @@ def drive_config() -> Mapping[str, Any]:
     ------
     SettingsError
         If the file is of another schema.
+
     """
     path = config_path('drive.yaml')
     data = yaml.safe_load(path.read_text(encoding='utf-8'))
@@ -86,6 +88,7 @@ def read_drive(path: str | os.PathLike[str], robot: str = 'husky') -> DriveRun:
         If it is neither.
     SettingsError
         If the robot is unknown.
+
     """
     robots = drive_config()['robots']
     if robot not in robots:

@@ -59,6 +59,7 @@ class EngineRobot:
         Speed loop of a side [N·m·s/rad], [N·m/rad], [s].
     torque_limit : float
         Of a side [N·m].
+
     """
 
     timestep: float
@@ -133,6 +134,7 @@ def engine_config() -> Mapping[str, Any]:
     ------
     SettingsError
         If the file is of another schema.
+
     """
     path = config_path('engine.yaml')
     data = yaml.safe_load(path.read_text(encoding='utf-8'))
@@ -154,6 +156,7 @@ def engine_robot(name: str) -> EngineRobot:
     ------
     SettingsError
         If it is unknown, or an entry of it is.
+
     """
     data = engine_config()
     known = {field.name for field in fields(EngineRobot)}
@@ -191,6 +194,7 @@ def drive(robot: EngineRobot, commands: TimeSeries, rate: float = 50.0) -> TimeS
     ------
     MissingExtraError
         If MuJoCo is not installed.
+
     """
     require('mujoco', 'drive in the engine')
     import mujoco

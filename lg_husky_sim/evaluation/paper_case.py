@@ -46,6 +46,7 @@ class Drive:
         By label.
     tracks : mapping of str to Tracking
         By label.
+
     """
 
     name: str
@@ -71,6 +72,7 @@ class CaseResult:
         The paper's genetic algorithm, least squares on all outputs, and the same with what the
         base does to a command.
     drives : tuple of Drive
+
     """
 
     case: Case
@@ -116,6 +118,7 @@ def evaluate_case(case: Case, model: ModelFile, seed: int, starts: int = STARTS,
     ------
     CommandError
         If a recording has no usable segment with a pose.
+
     """
     names = list(case.recordings)
     parts = {name: _longest(case.recordings[name]) for name in names}

@@ -67,6 +67,7 @@ class StepsResult:
         The graph refitted, and with what the base does to a command.
     what_to_change : Assessment
         How the recording differs from the last of these, and what to change for it.
+
     """
 
     recording: str
@@ -104,6 +105,7 @@ def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts
     ------
     FitError
         If there are too few steps.
+
     """
     parts = segments(recording)
     whole = observations(parts)

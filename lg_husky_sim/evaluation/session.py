@@ -47,6 +47,7 @@ class Request:
     model : ModelFile
     seed, starts, jobs : int
     topics : TopicMap or None
+
     """
 
     cases: tuple[str, ...]
@@ -72,6 +73,7 @@ class Evaluation:
         The tables, and what to change.
     data : mapping of str to Any
         The content of evaluation.json.
+
     """
 
     text: str
@@ -104,6 +106,7 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None],
     Returns
     -------
     Evaluation
+
     """
     read, = named_apart([read_recording(path, request.topics) for path in request.steps])
     results = [evaluate_case(case, request.model, request.seed, request.starts, request.jobs,
@@ -147,6 +150,7 @@ def report_data(request: Request, results: Sequence[CaseResult], steps: Sequence
     Returns
     -------
     ReportData
+
     """
     columns = tuple(dict.fromkeys(label for result in results for label in result.labels))
     said = [line for result in results for line in case_report.verdict(result)[:1]]

@@ -24,6 +24,7 @@ class Extension:
         As ``identify`` takes them.
     free : tuple of str
         Parameters that are estimated; empty for those that are free by default.
+
     """
 
     effects: tuple[str, ...]
@@ -39,6 +40,7 @@ def extensions() -> Mapping[str, Extension]:
     ------
     SettingsError
         If the file is of another schema.
+
     """
     path = config_path('evaluation.yaml')
     data = read_yaml(path, SettingsError)

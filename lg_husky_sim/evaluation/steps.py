@@ -35,6 +35,7 @@ class Step:
         Number of the segment in its observations.
     start, end : float
         On the recording's clock [s].
+
     """
 
     segment: int
@@ -54,6 +55,7 @@ def steps_of(data: Observations) -> tuple[Step, ...]:
     -------
     tuple of Step
         In order; commands that hold for less than :data:`SHORTEST` join the step before them.
+
     """
     found = []
     for number, segment in enumerate(data.segments):
@@ -90,6 +92,7 @@ def alternate_steps(data: Observations) -> tuple[Observations, Observations]:
     -------
     fitted, held_out : Observations
         Both simulate the same segments.
+
     """
     steps = steps_of(data)
     return (within(data, steps[0::2]), within(data, steps[1::2]))
@@ -105,6 +108,7 @@ def within(data: Observations, steps: Sequence[Step]) -> Observations:
     ----------
     data : Observations
     steps : sequence of Step
+
     """
     segments = []
     for number, segment in enumerate(data.segments):

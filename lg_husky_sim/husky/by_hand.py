@@ -53,6 +53,7 @@ class Number:
     ------
     ParameterError
         If something is no finite number, or the tolerance is negative.
+
     """
 
     value: float | None = None
@@ -108,6 +109,7 @@ def bounds_of(nominal: Parameter, value: float, robot: RobotSize = HUSKY,
     ------
     ParameterError
         If the value has the wrong sign, or is far beyond the bounds.
+
     """
     words = f'{nominal.name} = {value:g} {nominal.unit}'
     # A bound of zero is one of sign, and cannot move.
@@ -168,6 +170,7 @@ def with_numbers(parameters: Parameters, own: Collection[str],
     ------
     ParameterError
         If a name is unknown, or a number none that the robot can have.
+
     """
     given = {}
     for name, number in settings.items():
@@ -229,6 +232,7 @@ def about_of(about: str, before: Parameters, after: Parameters) -> str:
     -------
     str
         Of another robot, only its size; otherwise what it was, and what was set by hand.
+
     """
     new = [e for e, old in zip(after.entries, before.entries, strict=True)
            if (e.value, e.source) != (old.value, old.source)]

@@ -35,6 +35,7 @@ def smooth_commands(plant: PlantSet, lag: float) -> PlantSet:
     -------
     PlantSet
         With two more states; inputs are what the commands ask for.
+
     """
     n = plant.a.shape[0]
     a = np.zeros((n + 2, n + 2))

@@ -61,6 +61,7 @@ class Onset:
         first recording in which the place matters; empty for all.
     earlier : tuple of str
         Names of the recordings that are known to be earlier.
+
     """
 
     kind: OnsetKind
@@ -115,6 +116,7 @@ class EffectParameter:
         'forward' speed or 'yaw' rate; empty for no limit.
     label : str
         What sentences call it; its name in words if empty.
+
     """
 
     name: str
@@ -159,6 +161,7 @@ class Remedy:
         Sentences; names of parameters, and side, where, wheels, stream, stand in braces.
     instead : tuple of str
         Parameters of sim_node to set in place of loading the model with the effect.
+
     """
 
     robot: tuple[str, ...] = ()
@@ -202,6 +205,7 @@ class EffectKind:
     advice : Remedy
     name : str
         What reports call it.
+
     """
 
     id: str  # noqa: A003
@@ -258,6 +262,7 @@ class Effect:
     ------
     ParameterError
         If the id, side or shape is unknown.
+
     """
 
     id: str  # noqa: A003
@@ -316,6 +321,7 @@ def check_distinct(effects: Iterable[Effect]) -> None:
     ------
     ParameterError
         If two do: it cannot be two numbers.
+
     """
     owners: dict[str, Effect] = {}
     for effect in effects:
@@ -352,14 +358,7 @@ def _read_kind(name: str, entry: Mapping[str, Any]) -> EffectKind:
 
 @cache
 def catalogue() -> Mapping[str, EffectKind]:
-    """
-    Return the catalogue of ``config/effects.yaml`` by id.
-
-    Raises
-    ------
-    ModelFileError
-        If the file is not a catalogue.
-    """
+    """Return the catalogue of ``config/effects.yaml`` by id; ModelFileError if it is none."""
     path = config_path('effects.yaml')
     data = read_yaml(path, ModelFileError)
     if data.get('schema') != 'lg_husky_sim/effects/1':
@@ -388,6 +387,7 @@ def effect_kind(name: str) -> EffectKind:
     ------
     ParameterError
         If there is none of that id; a near one is suggested.
+
     """
     known = {**catalogue(), **descriptions()}
     if name not in known:

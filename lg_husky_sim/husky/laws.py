@@ -263,6 +263,7 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
     memory : numpy.ndarray, shape (MEMORY,)
     out : numpy.ndarray, shape (n_efforts,)
         Receives the efforts; the last in series with a motor is the sum of them.
+
     """
     in_series = 0
     for j in range(out.size):

@@ -53,6 +53,7 @@ class Structure:
     ------
     ParameterError
         If an effect is late and there is no onset.
+
     """
 
     drivetrain: Drivetrain = Drivetrain.SIMPLIFIED
@@ -91,6 +92,7 @@ class Structure:
         Returns
         -------
         EditedNetwork
+
         """
         return [self._bare(), *(edited for _, edited in self._edits(late))][-1]
 
@@ -133,6 +135,7 @@ class Structure:
         -------
         tuple of Effect
             Without those whose place a changed one has taken.
+
         """
         there = [e for e in self.effects if late or not e.late]
         changed = {(e.id, e.side) for e in there if e.again}
@@ -228,6 +231,7 @@ class HuskyModel:
     structure : Structure
     regimes : tuple
         The derived networks, without and with the late effects.
+
     """
 
     structure: Structure
@@ -250,6 +254,7 @@ class HuskyModel:
         ------
         ParameterError
             If a parameter is missing.
+
         """
         try:
             sets = tuple(regime.at(parameters) for regime in self.regimes)
@@ -301,5 +306,6 @@ def compile_model(structure: Structure) -> HuskyModel:
         If the edited graph cannot be derived.
     ParameterError
         If the effects do not fit the structure.
+
     """
     return HuskyModel(structure, _compiled(structure.drivetrain, structure.effects))

@@ -42,6 +42,7 @@ class ModelFile:
         Those of the robot and of all effects.
     about : str
         One line on where the model comes from.
+
     """
 
     structure: Structure
@@ -86,6 +87,7 @@ def model_from_data(data: object, name: str, *, complete: bool = False) -> Model
     ------
     ModelFileError
         If something is missing, unknown or of the wrong type: all of it, a line each.
+
     """
     nominal = None if complete else packaged().parameters
     try:
@@ -116,6 +118,7 @@ def load_model(path: str | os.PathLike[str] | None = None) -> ModelFile:
     ------
     ModelFileError
         If it cannot be read as a model; the message names file, thing, value and what is allowed.
+
     """
     place = Path(path) if path is not None else default_model_path()
     if place == Path(PAPER) and not place.exists():
@@ -155,6 +158,7 @@ def apply_settings(model: ModelFile, settings: Mapping[str, float | Number],
     ------
     ParameterError
         If a name is unknown or a number none that the robot can have.
+
     """
     parameters = with_numbers(model.parameters, packaged_parameters(), settings)
     if about is None:
@@ -170,6 +174,7 @@ def parse_settings(pairs: tuple[str, ...]) -> dict[str, float]:
     ------
     ParameterError
         If a text is not of that form, or a name is given twice.
+
     """
     settings = {}
     for pair in pairs:
@@ -236,6 +241,7 @@ def save_model(model: ModelFile, path: str | os.PathLike[str]) -> None:
     ------
     SettingsError
         If something else is there.
+
     """
     place = Path(path)
     check_ours(place, BEGINNING)

@@ -68,6 +68,7 @@ def read_model(data: object, nominal: Parameters | None
     ------
     ModelFileError
         If something is missing, unknown or of the wrong type; one line each for all of it.
+
     """
     errors: list[str] = []
     content = _mapping('the file', data)
@@ -241,6 +242,7 @@ def _parameter(errors: list[str], name: str, entry: object, nominal: Parameter |
         What it is where the file tells less; without, everything has to be told.
     robot : RobotSize or None
         To which the nominal bounds are in proportion; None where they hold as they are.
+
     """
     before = len(errors)
     if nominal is not None and not isinstance(entry, (dict, list)):

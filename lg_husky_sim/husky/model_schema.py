@@ -115,6 +115,7 @@ def json_schema(nominal: dict[str, str]) -> dict[str, Any]:
     ----------
     nominal : dict of str to str
         Name of each parameter that a model holds, and what to say of it.
+
     """
     kinds = {**catalogue(), **descriptions()}
     effect = {**EFFECT, 'allOf': [_effect(kind) for kind in kinds.values()], 'properties': {

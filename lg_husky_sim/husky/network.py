@@ -73,6 +73,7 @@ def simplified() -> LinearGraph:
     -------
     LinearGraph
         Element values are expressions in the names of ``config/husky.yaml``.
+
     """
     inertias: list[Branch] = []
     rest: list[Branch] = []
@@ -99,6 +100,7 @@ def expanded() -> LinearGraph:
     -------
     LinearGraph
         Rear axles (driven by the motors) first; belts are a spring beside a damper.
+
     """
     inertias: list[Branch] = []
     rest: list[Branch] = []
@@ -142,6 +144,7 @@ def on_side(elements: Iterable[str], side: str) -> tuple[str, ...]:
     -------
     tuple of str
         Those of the side, and those of both.
+
     """
     other = _OF_SIDE.get({'left': 'right', 'right': 'left'}.get(side, ''))
     return tuple(name for name in elements if other is None or not other.search(name))

@@ -22,6 +22,7 @@ def number_of(name: str, value: object) -> float:
     ------
     ParameterError
         If it is no number.
+
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise ParameterError(f'{name} = {shown(value)} is not a number')
@@ -59,6 +60,7 @@ class Parameter:
     ------
     ParameterError
         If the value is not finite or outside its bounds, or the tolerance is negative.
+
     """
 
     name: str
@@ -97,6 +99,7 @@ class Parameters(Mapping[str, float]):
     ----------
     entries : tuple of Parameter
         In the order of the file; names are unique.
+
     """
 
     entries: tuple[Parameter, ...]
@@ -138,6 +141,7 @@ class Parameters(Mapping[str, float]):
         ------
         UnknownParameterError
             If there is none of that name; a near name is suggested.
+
         """
         index: dict[str, int] = self._index  # type: ignore[attr-defined]
         if name not in index:
@@ -163,6 +167,7 @@ class Parameters(Mapping[str, float]):
         ------
         ParameterError
             If a name is unknown, or a value is no number or outside its bounds.
+
         """
         changed = {name: replace(self.entry(name), value=number_of(name, value), low=None,
                                  high=None) for name, value in values.items()}

@@ -37,6 +37,7 @@ class CommandStage:
         Eqs. (24), (25): left = speed − rate, right = speed + rate [V·s/m, V·s/rad].
     clamp : float
         Largest voltage [V]; 0 where a controller clamps instead.
+
     """
 
     volts_per_speed: float
@@ -66,6 +67,7 @@ class SensorModel:
         Of the pack and its wires [Ω].
     droop_rate, droop_floor : float
         Share of the voltage that is lost per second [1/s], and the most that is lost.
+
     """
 
     gyro_bias: float = 0.0
@@ -91,6 +93,7 @@ class SensorModel:
             That the motors take [W].
         time : float
             Since the start [s].
+
         """
         idle = supply * (1.0 - min(self.droop_rate * time, self.droop_floor))
         # V = idle - R I with V I = power.
@@ -116,6 +119,7 @@ class PlantSet:
     coefficients : numpy.ndarray, shape (n_efforts, laws.WIDTH)
     command : CommandStage
     sensors : SensorModel
+
     """
 
     a: FloatArray
@@ -145,6 +149,7 @@ class Plant:
     states : tuple of str
         Names of the n states.
     onset : Onset or None
+
     """
 
     sets: tuple[PlantSet, ...]
@@ -174,6 +179,7 @@ class Plant:
         -------
         Plant
             With the onset where it falls into this recording, else with one set only.
+
         """
         onset = self.onset
         if onset is None or len(self.sets) < 2 or onset.recording in ('', name):
@@ -195,6 +201,7 @@ class Plant:
         Returns
         -------
         numpy.ndarray of bool, shape (n,)
+
         """
         if self.onset is None:
             return np.zeros(times.size, dtype=bool)
@@ -216,6 +223,7 @@ class Plant:
             ticks), wheel rates and angles by the encoders' factors, yaw rate by the gyro's factor
             and bias, every stream by its delay. Speed, distance, currents and voltages are left
             as they are.
+
         """
         late = self.late(truth.times, truth.column('x'))
         seen = [_observed(truth, one.sensors) for one in self.sets]
@@ -241,6 +249,7 @@ def acts(onset: Onset, times: FloatArray, x: FloatArray) -> np.typing.NDArray[np
     Returns
     -------
     numpy.ndarray of bool, shape (n,)
+
     """
     match onset.kind:
         case OnsetKind.TIME:

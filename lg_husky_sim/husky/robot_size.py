@@ -35,6 +35,7 @@ class RobotSize:
     ----------
     mass, length, voltage : float
         Its mass, the geometric mean of wheel radius and track, its supply.
+
     """
 
     mass: float = 1.0
@@ -87,6 +88,7 @@ def size_of(robot: Mapping[str, float], husky: Mapping[str, float]) -> RobotSize
     Returns
     -------
     RobotSize
+
     """
     def times(name: str) -> float:
         return min(max(robot[name] / husky[name], 1.0 / FARTHEST), FARTHEST)
@@ -108,6 +110,7 @@ def speeds_of(robot: Mapping[str, float], husky: Mapping[str, float]
     -------
     forward, yaw, wheels : float
         Of forward speed, yaw rate and wheel rates.
+
     """
     forward = husky['command_gain'] / robot['command_gain']
     return (forward, forward * (husky['turn_ratio'] / robot['turn_ratio']),

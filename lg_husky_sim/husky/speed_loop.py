@@ -41,6 +41,7 @@ def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
     -------
     PlantSet
         With four more states; inputs are the reference voltages.
+
     """
     n, efforts = plant.a.shape[0], plant.laws.size
     transmission = values['torque_constant'] * values['gear_ratio']
@@ -86,6 +87,7 @@ def clipped(plant: PlantSet, volts: FloatArray, enters: FloatArray, reads: Float
     -------
     PlantSet
         With two more laws; what else acts on the driver's voltage sees it clipped.
+
     """
     arguments = plant.h.shape[0]
     inner = np.array(plant.coefficients)

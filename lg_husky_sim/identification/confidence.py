@@ -52,6 +52,7 @@ class Confidence:
         Corrections of the starts of single segments.
     local_deviations : numpy.ndarray, shape (n_local,)
         Their standard deviations.
+
     """
 
     unknowns: tuple[Unknown, ...]
@@ -102,6 +103,7 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     Confidence
         Variances are the larger of the curvature's and of the sandwich's, the latter widened by
         Student's t, so that few blocks do not feign accuracy.
+
     """
     observations, metric, layout = problem.observations, problem.metric, problem.layout
     white = metric.whiten(observations, observations.measured - solution.predicted)
@@ -175,6 +177,7 @@ def undetermined(result: Confidence, values: FloatArray) -> tuple[str, ...]:
     -------
     tuple of str
         One sentence each; empty where every parameter is known by itself.
+
     """
     said: list[str] = []
     deviations = result.deviations

@@ -113,6 +113,7 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
         If nothing is free, or eq. (23) is asked for without a pose.
     RecordingError
         If no segment can be used.
+
     """
     names = free_names(model, free)
     began = time.perf_counter()
@@ -220,6 +221,7 @@ def channel_fits(data: Observations, segments: Sequence[Segment], before: ModelF
     -------
     tuple of ChannelFit
         Position last, where a pose was recorded: root mean square distance [m].
+
     """
     plants = [compile_model(m.structure).at(m.parameters) for m in (before, after)]
     errors = [data.measured - data.predict(plants[0]), data.measured - (

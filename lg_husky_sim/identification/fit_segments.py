@@ -53,6 +53,7 @@ class Channel:
         Measured; increments are divided by their window [unit of :data:`UNITS`].
     begins : numpy.ndarray, shape (n,)
         For increments, the begins of the windows [s]; else equal to ``times``.
+
     """
 
     name: str
@@ -91,6 +92,7 @@ class FitSegment:
     sampled : bool
         Whether the wheel rates are those of the moment, not means over the time in which an
         encoder counts.
+
     """
 
     recording: str
@@ -191,6 +193,7 @@ def segment_for_fit(segment: Segment, settle: float = SETTLE) -> FitSegment | No
     -------
     FitSegment or None
         None if it is too short or has no command or no measurement.
+
     """
     streams = segment.streams
     if 'command' not in streams or segment.duration < 2.0 * SETTLE:

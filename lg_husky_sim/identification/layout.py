@@ -45,6 +45,7 @@ class Layout:
         Unknowns of each segment that has its own.
     rows : tuple of slice
         Values of each of these segments.
+
     """
 
     def __init__(self, observations: Observations, unknowns: Sequence[Local]) -> None:
@@ -76,6 +77,7 @@ class Layout:
         Returns
         -------
         numpy.ndarray, shape (n_unknowns,)
+
         """
         if not self.own.size:
             return np.asarray(slope.T @ values)
@@ -99,6 +101,7 @@ class Layout:
         -------
         numpy.ndarray, shape (n_unknowns, n_unknowns)
             Zero between own unknowns of different segments.
+
         """
         if not self.own.size:
             return np.asarray(slope.T @ slope)
@@ -128,6 +131,7 @@ class Layout:
         -------
         numpy.ndarray, shape (n_unknowns,)
             Zero where not free.
+
         """
         found = np.zeros(self.size)
         if not self.own.size:
@@ -182,6 +186,7 @@ class Layout:
             Minus by how much the own unknowns follow the shared ones.
         alone : numpy.ndarray, shape (n_segments, n_own)
             Variance of each own unknown if the shared ones were known.
+
         """
         n = self.shared.size
         if not self.own.size:

@@ -43,6 +43,7 @@ class Unknown:
         Whether it belongs to the observation instead of the model.
     local : tuple of int, optional
         For a correction of the start of one segment: the segment's number, and which correction.
+
     """
 
     name: str
@@ -98,6 +99,7 @@ class Solution:
     converged : bool
     at_bound : tuple of str
         Unknowns that ended on a bound.
+
     """
 
     unknowns: tuple[Unknown, ...]
@@ -132,6 +134,7 @@ class Problem:
         Values of everything that is not varied.
     metric : Metric
     unknowns : sequence of Unknown
+
     """
 
     def __init__(self, observations: Observations, model: HuskyModel, parameters: Parameters,
@@ -202,6 +205,7 @@ class Problem:
         -------
         numpy.ndarray, shape (n_values, n_columns)
             Those of the unknowns that all segments share, then the packed ones.
+
         """
         layout = self.layout
         columns = [] if known is None else [*known.T]
@@ -301,6 +305,7 @@ def solve(problem: Problem, start: Mapping[str, float], steps: int = 12,
     -------
     Solution or None
         None if the model cannot be evaluated at the start.
+
     """
     observations, metric = problem.observations, problem.metric
     varied = problem.start(start)

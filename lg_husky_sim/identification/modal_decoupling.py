@@ -45,6 +45,7 @@ class DecoupledModes:
         Input: the mean voltage, and half the difference right − left [V].
     stage : numpy.ndarray, shape (n_candidates, 3)
         Volts per forward speed [V·s/m], volts per yaw rate [V·s/rad] and the clamp [V].
+
     """
 
     a: FloatArray
@@ -90,6 +91,7 @@ class ModalDecoupling:
     ------
     FitError
         If the model does not decouple.
+
     """
 
     def __init__(self, model: HuskyModel, parameters: Parameters, free: tuple[str, ...]) -> None:
@@ -149,6 +151,7 @@ class ModalDecoupling:
         ------
         FitError
             If a candidate does not decouple.
+
         """
         if self._slopes is not None:
             # One product and one sum an entry, in a fixed order: the same numbers whatever the

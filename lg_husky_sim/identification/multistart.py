@@ -50,6 +50,7 @@ class End:
         [nats]; infinite where the model could not be evaluated.
     converged : bool
     evaluations : int
+
     """
 
     values: Mapping[str, float]
@@ -106,6 +107,7 @@ def first_metric(data: Observations, model: ModelFile) -> Metric:
     -------
     Metric
         Without correlation.
+
     """
     predicted = data.predict(compile_model(model.structure).at(model.parameters))
     residual = data.measured - predicted
@@ -135,6 +137,7 @@ def best_solution(data: Observations, model: ModelFile, unknowns: Sequence[Unkno
     ------
     FitError
         If the model cannot be evaluated at any start.
+
     """
     shared = first_metric(data, model)
     tasks = [_Task(data, model, tuple(unknowns), shared, start)
@@ -161,6 +164,7 @@ def judged(problem: Problem, ends: Ends) -> tuple[Problem, FloatArray]:
     problem : Problem
     costs : numpy.ndarray, shape (n_ends,)
         [nats]; infinite where the model cannot be evaluated.
+
     """
     data = problem.observations
     judge = Problem(data, problem.model, problem.parameters, believable(data, problem.metric),
@@ -187,6 +191,7 @@ def noise_metric(data: Observations, residual: FloatArray, predicted: FloatArray
     Metric
         A channel is whitened only where its residual is not autocorrelated: one that is shows an
         error of the model, and whitening would turn the fit away from it. Outliers lose weight.
+
     """
     scale = scales(data, residual, predicted)
     plain = metric(data, residual, scale, order=0)
@@ -212,6 +217,7 @@ def is_autocorrelated(data: Observations, scaled: FloatArray, name: str) -> bool
         Residual times the metric's scale.
     name : str
         Channel.
+
     """
     above, below, count = 0.0, 0.0, 0
     for one in data.slices:
@@ -252,6 +258,7 @@ def refine(data: Observations, model: ModelFile, unknowns: Sequence[Unknown],
     ------
     FitError
         If the model cannot be simulated at the start.
+
     """
     used = first_metric(data, model)
     compiled = compile_model(model.structure)

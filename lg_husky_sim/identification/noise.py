@@ -43,6 +43,7 @@ class Shared:
         U, orthonormal columns.
     taken : numpy.ndarray, shape (n,)
         Part of each direction that is taken away.
+
     """
 
     observations: Observations
@@ -69,6 +70,7 @@ def shared_of(observations: Observations, columns: FloatArray) -> Shared:
     Returns
     -------
     Shared
+
     """
     squares, rotation = np.linalg.eigh(columns.T @ columns)
     kept = squares > 1e-11 * max(float(squares.max(initial=0.0)), 1e-12)
@@ -90,6 +92,7 @@ class Metric:
         For each channel the taps [1, -a1, ...] divided by the innovations' deviation.
     parts : mapping of str to mapping of str to float
         What is taken off a channel of others that see the same motion.
+
     """
 
     scale: FloatArray
@@ -115,6 +118,7 @@ class Metric:
         -------
         numpy.ndarray
             Shape as given.
+
         """
         white = self.filtered(observations, values)
         if observations.common is None:
@@ -132,6 +136,7 @@ class Metric:
         Returns
         -------
         Shared
+
         """
         key = id(observations)
         if key not in self._shared:
@@ -154,6 +159,7 @@ class Metric:
         -------
         numpy.ndarray
             Shape as given.
+
         """
         scaled = apart(observations, self.parts, values) * (
             self.scale if values.ndim == 1 else self.scale[:, None])
@@ -190,6 +196,7 @@ def stepwise(values: FloatArray) -> float:
     -------
     float
         Standard deviation, if it were normal; 0 where the median can be believed.
+
     """
     sizes = np.sort(np.abs(values[np.abs(values) > 0.0]))
     inner = sizes[:int(0.9 * sizes.size)]
@@ -214,6 +221,7 @@ def scales(observations: Observations, residual: FloatArray, predicted: FloatArr
     Returns
     -------
     numpy.ndarray, shape (n_values,)
+
     """
     scale = np.zeros(residual.size)
     for name in observations.channels:
@@ -257,6 +265,7 @@ def robust(observations: Observations, left: FloatArray, scale: FloatArray, limi
     Returns
     -------
     numpy.ndarray, shape (n_values,)
+
     """
     weighted = np.array(scale)
     for name in observations.channels:
@@ -289,6 +298,7 @@ def metric(observations: Observations, residual: FloatArray, scale: FloatArray,
     Returns
     -------
     Metric
+
     """
     parts = coefficients(observations, residual, scale) if related else {}
     residual = apart(observations, parts, residual)

@@ -24,6 +24,7 @@ def effect_in(text: str) -> Effect:
     ------
     ParameterError
         If the id, side or shape is unknown.
+
     """
     name, *rest = text.split(':', 2)
     kind = Effect(name).kind
@@ -48,6 +49,7 @@ def with_effects(model: ModelFile, texts: Sequence[str]) -> ModelFile:
     ------
     ParameterError
         If one is unknown or does not fit, or two share a parameter.
+
     """
     structure, parameters = model.in_proportion().structure, model.parameters
     for name in names_in(texts):

@@ -25,6 +25,7 @@ class SearchRange:
     result : float
         [unit]
     unit : str
+
     """
 
     lower: float
@@ -48,6 +49,7 @@ class Paper:
         Largest absolute errors in x and y [m] by manoeuvre.
     population_search : mapping of str to float
         What the paper leaves open, by name.
+
     """
 
     population: int
@@ -67,6 +69,7 @@ def paper() -> Paper:
     ------
     SettingsError
         If the file is of another schema.
+
     """
     path = config_path('paper.yaml')
     data = read_yaml(path, SettingsError)

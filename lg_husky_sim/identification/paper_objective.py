@@ -58,6 +58,7 @@ class Track:
         All that are fitted, in their order: some effects begin between them.
     before : BodyTwist
         What had been commanded until the start.
+
     """
 
     name: str
@@ -86,6 +87,7 @@ class Track:
         Parameters
         ----------
         plant : Plant
+
         """
         if plant.onset is not None:
             plant = plant.in_recording(self.recording, plant.onset.before(self.recordings))
@@ -113,6 +115,7 @@ def track_of(segment: Segment, recordings: Sequence[str] = ()) -> Track | None:
     -------
     Track or None
         None where there is no pose or no command.
+
     """
     pose, commands = segment.streams.get('pose'), segment.streams.get('command')
     if pose is None or commands is None or len(pose) < 3 or len(commands) == 0:
@@ -162,6 +165,7 @@ class PaperObjective:
     ------
     FitError
         If no segment has a pose.
+
     """
 
     def __init__(self, model: HuskyModel, parameters: Parameters, free: tuple[str, ...],
@@ -211,6 +215,7 @@ class PaperObjective:
         -------
         numpy.ndarray, shape (n_candidates,)
             [m]; infinite where a candidate cannot be simulated.
+
         """
         rows = np.atleast_2d(np.asarray(candidates, dtype=np.float64))
         if self._decoupling is None:

@@ -80,6 +80,7 @@ class Observations:
         Stamp of each value on its recording's clock [s].
     slices : tuple of Slice
         In the order of the vector.
+
     """
 
     segments: tuple[FitSegment, ...]
@@ -130,6 +131,7 @@ class Observations:
         Returns
         -------
         numpy.ndarray, shape (n_values,)
+
         """
         given = extra or {}
         grids = self.simulate(plant, given.get('latency', 0.0), self.corrections(given))
@@ -149,6 +151,7 @@ class Observations:
         numpy.ndarray, shape (n_segments, 4), or None
             In the order of :data:`~lg_husky_sim.identification.fit_segments.CORRECTIONS`; None if
             there is none.
+
         """
         if not any('@' in name for name in extra):
             return None
@@ -176,6 +179,7 @@ class Observations:
         -------
         tuple of numpy.ndarray, shape (count + 1, 15)
             The kernel's columns, a segment each.
+
         """
         simulators: dict[tuple[PlantSet, ...], Simulator] = {}
         grids = []
@@ -206,6 +210,7 @@ class Observations:
         Returns
         -------
         numpy.ndarray, shape (n_values,)
+
         """
         parts = [_observe(segment, self.plant_in(plant, segment.recording), grid, extra or {})
                  for segment, grid in zip(self.segments, grids, strict=True)]
@@ -251,6 +256,7 @@ def late_mask(plant: Plant, segment: FitSegment, times: FloatArray) -> NDArray[n
     Returns
     -------
     numpy.ndarray of bool, shape (n,)
+
     """
     x = np.full(times.size, np.nan) if segment.pose is None else np.interp(
         times, segment.pose.times, segment.pose.column('x'))
@@ -304,6 +310,7 @@ def observations(segments: Sequence[Segment], settle: float = SETTLE) -> Observa
     ------
     RecordingError
         If none of them can be used.
+
     """
     usable = tuple(one for one in (segment_for_fit(s, settle) for s in segments)
                    if one is not None)

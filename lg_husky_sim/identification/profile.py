@@ -32,6 +32,7 @@ class Profile:
         Held values [unit], and by how much the cost is above the least one [nats].
     low, high : float
         Where it crosses the 95 % level [unit]; infinite where it does not.
+
     """
 
     name: str
@@ -68,6 +69,7 @@ def profile(problem: Problem, solution: Solution, name: str, deviation: float,
     ------
     FitError
         If the parameter was not estimated.
+
     """
     names = [u.name for u in problem.unknowns]
     if name not in names:

@@ -41,6 +41,7 @@ class Link:
     channel, source : str
     operator : scipy.sparse.csr_array, shape (n_values, n_values)
         Rows of other channels, and of segments without the source, are empty.
+
     """
 
     channel: str
@@ -60,6 +61,7 @@ def links(observations: Observations) -> tuple[Link, ...]:
     Returns
     -------
     tuple of Link
+
     """
     size = observations.measured.size
     known = {(s.segment, s.channel): s for s in observations.slices}
@@ -105,6 +107,7 @@ def apart(observations: Observations, parts: Mapping[str, Mapping[str, float]],
     -------
     numpy.ndarray
         Shape as given.
+
     """
     left = values
     for link in links(observations):
@@ -134,6 +137,7 @@ def averaging(times: FloatArray, begins: FloatArray, ends: FloatArray
         Number of the sample.
     numpy.ndarray, shape (k,)
         Its weight; the weights of an interval add up to one.
+
     """
     first = np.searchsorted(times, begins, side='left')
     last = np.searchsorted(times, ends, side='right')
@@ -172,6 +176,7 @@ def coefficients(observations: Observations, residual: FloatArray, scale: FloatA
     -------
     dict of str to dict of str to float
         By channel and source; a coefficient that explains nothing is near zero.
+
     """
     found, result = links(observations), {}
     for channel in SOURCES:

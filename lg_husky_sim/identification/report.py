@@ -65,6 +65,7 @@ def report_paths(out: Path) -> tuple[Path, ...]:
     ------
     SettingsError
         If it does not, or something is there that is no earlier fit.
+
     """
     if out.suffix not in ('.yaml', '.yml'):
         raise SettingsError(f'{out}: a model file ends in .yaml or .yml')
@@ -92,6 +93,7 @@ def files_together(paths: Sequence[Path]) -> Iterator[Mapping[Path, Path]]:
     ------
     mapping of pathlib.Path to pathlib.Path
         Where to write each; they are moved into place when the block ends without an exception.
+
     """
     with scratch_beside(paths[0]) as scratch:
         places = {path: scratch / path.name for path in paths}
@@ -128,6 +130,7 @@ def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile,
     ------
     SettingsError
         If a name cannot be used.
+
     """
     paths = report_paths(out)
     with files_together(paths) as places:
@@ -161,6 +164,7 @@ def report_data(result: FitResult, segments: Sequence[Segment], before: ModelFil
     Returns
     -------
     ReportData
+
     """
     columns = (BEFORE, FITTED)
     plants = {label: compile_model(model.structure).at(model.parameters)
@@ -282,6 +286,7 @@ def convergence_chart(history: FloatArray, name: str = 'convergence') -> Chart:
     Returns
     -------
     Chart
+
     """
     generations = np.arange(len(history), dtype=np.float64)
     best, mean = (number(float(value), 4) for value in history[-1])

@@ -43,6 +43,7 @@ class Estimated:
         Value in the model that was given [unit].
     nuisance : bool
         Whether it belongs to the recording (a stamp's delay, an offset), not to the model.
+
     """
 
     name: str
@@ -66,6 +67,7 @@ class ChannelFit:
         Values.
     before, after : float
         Root mean square of measured minus predicted [unit].
+
     """
 
     name: str
@@ -85,6 +87,7 @@ class Start:
     values : mapping of str to float
     cost : float
     converged : bool
+
     """
 
     values: Mapping[str, float]
@@ -132,6 +135,7 @@ class FitResult:
     driven : tuple of ChannelFit
         Both models driven by the commands alone from the start of each segment, without the
         resets of ``channels``.
+
     """
 
     method: Method

@@ -42,6 +42,7 @@ def sample(column: FloatArray, start: float, times: FloatArray) -> FloatArray:
     Returns
     -------
     numpy.ndarray, shape (n,)
+
     """
     if _COMPILED:
         return _loop(column, start, PERIOD, times)

@@ -36,6 +36,7 @@ class SearchResult:
         Candidates that were evaluated.
     converged : bool
     message : str
+
     """
 
     values: FloatArray
@@ -96,6 +97,7 @@ def genetic(objective: Objective, lower: FloatArray, upper: FloatArray, seed: in
     ------
     MissingExtraError
         If the package `deap` is not installed.
+
     """
     require('deap', 'run the genetic algorithm')
     from deap import tools
@@ -182,6 +184,7 @@ def differential_evolution(objective: Objective, lower: FloatArray, upper: Float
     Returns
     -------
     SearchResult
+
     """
     from scipy import optimize
 

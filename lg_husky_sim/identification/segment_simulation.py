@@ -43,6 +43,7 @@ def simulate_segment(simulator: Simulator, segment: FitSegment, latency: float =
         a wheel's angle follows the measured one there, too, read as by the sensors before an
         onset: it would be out of phase after a few turns otherwise. The angle columns go on
         without a jump.
+
     """
     events, before = _events(segment, latency)
     twist, rates = segment.twist, segment.wheel_rates

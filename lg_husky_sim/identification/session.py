@@ -46,6 +46,7 @@ class Request:
     seed, starts : int
     topics : TopicMap or None
     look : Look or None
+
     """
 
     model: ModelFile
@@ -68,6 +69,7 @@ def read_segments(request: Request, paths: Sequence[str]) -> list[Segment]:
     ------
     RecordingError
         If a recording cannot be read or is given twice.
+
     """
     onset = request.model.structure.onset
     read, = named_apart(named_as_in([read_recording(path, request.topics) for path in paths],
@@ -128,6 +130,7 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
     ------
     SettingsError
         If ``out`` is a file, two recordings would share a name, or one has that of another file.
+
     """
     if out.exists() and not out.is_dir():
         raise SettingsError(f'{out} is not a folder; --each needs one')

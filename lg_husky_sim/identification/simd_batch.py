@@ -97,6 +97,7 @@ def operators(modes: DecoupledModes, period: float) -> FloatArray:
     numpy.ndarray, shape (2, ROWS, 4, n_candidates)
         Columns are the three states and the input; the last row is the integral of the body
         rate over the step (distance, or turn).
+
     """
     count = modes.a.shape[0]
     maps = np.zeros((count, 2, ROWS, 4))
@@ -224,6 +225,7 @@ def batch_cost(op: FloatArray, stage: FloatArray, begin: FloatArray, commands: F
     -------
     numpy.ndarray, shape (n_candidates,)
         [m]
+
     """
     count = op.shape[-1]
     if compiled():

@@ -58,6 +58,7 @@ class StartState:
     determined : bool
         Whether the interval is narrower than half of what was given to the fit as prior.
     at_bound : bool
+
     """
 
     name: str
@@ -88,6 +89,7 @@ def settle_of(structure: Structure, nuisance: Sequence[str]) -> float:
         Early where the start is estimated and nothing reaches back before it. What was
         commanded and done before a segment is not recorded, and a dead time, a ramp or a speed
         loop still answers to it.
+
     """
     back = any(one.kind.subsystem is Subsystem.COMMAND or any(p.delays for p in one.parameters())
                for one in structure.effects)
@@ -111,6 +113,7 @@ def remembered(plant: Plant, settle: float) -> tuple[int, ...]:
         Those that still show in wheel rates or body then, friction and other laws apart; what
         the model has forgotten is not worth an unknown. The paper's wheels follow their motors
         in two milliseconds, a controller's do not.
+
     """
     one = plant.sets[0]
     simulator = Simulator(plant, settle, fine_pose=False)
@@ -150,6 +153,7 @@ def start_unknowns(data: Observations, plant: Plant, settle: float,
     FitError
         If two segments have one name, or the data have common errors, which tie all segments to
         each other.
+
     """
     if data.common is not None:
         raise FitError(f'{INITIAL_STATE} cannot be estimated where errors are common to all '
@@ -189,6 +193,7 @@ def start_states(data: Observations, unknowns: Sequence[Unknown], values: Sequen
         Estimates.
     deviations : numpy.ndarray, shape (n_unknowns,)
         Their standard deviations.
+
     """
     found = []
     reach = float(ndtri(0.975))
@@ -225,6 +230,7 @@ def summary(starts: Sequence[StartState]) -> list[tuple[str, ...]]:
         Cells under :data:`HEAD`: in how many segments the data and not the prior determine it,
         the median size of the corrections, the largest and where it is, and the median half
         width of the intervals.
+
     """
     rows: list[tuple[str, ...]] = []
     for quantity in CORRECTIONS:

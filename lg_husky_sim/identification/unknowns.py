@@ -54,6 +54,7 @@ def free_names(model: ModelFile, asked: Sequence[str]) -> tuple[str, ...]:
         If nothing is free.
     ParameterError
         If a name is unknown.
+
     """
     if asked:
         for name in asked:
@@ -97,6 +98,7 @@ def unknowns_of(model: ModelFile, names: Sequence[str], nuisance: Sequence[str],
     ------
     FitError
         If a nuisance is unknown.
+
     """
     of_effects = effect_parameters(model)
     found = []
@@ -146,6 +148,7 @@ def starts_of(model: ModelFile, unknowns: Sequence[Unknown], count: int, seed: i
         The first is the model's own; in the others the robot's parameters are spread by a
         factor of :data:`AROUND` or :data:`NEAR` either way, evenly in the logarithm, and effects
         take the sizes of the catalogue in turn.
+
     """
     draws = np.random.default_rng(seed)
     of_effects = effect_parameters(model)
@@ -188,6 +191,7 @@ def search_bounds(parameters: Parameters, names: Sequence[str]
     Returns
     -------
     lower, upper : numpy.ndarray, shape (n_names,)
+
     """
     robot = size_of(parameters, packaged().parameters)
     rows = []

@@ -24,6 +24,7 @@ def cancelled(above: Any, below: Any) -> tuple[Any, Any]:
     ----------
     above, below : polynomials
         Elements of one of SymPy's sparse polynomial rings over the integers.
+
     """
     if not above:
         return above, above.ring.one

@@ -22,6 +22,7 @@ def check_graph(graph: LinearGraph) -> None:
     ------
     GraphError
         For the first mistake found.
+
     """
     if not graph.edges:
         raise GraphError('the graph has no branches')
@@ -42,6 +43,7 @@ def check_complete(graph: LinearGraph) -> None:
     ------
     GraphError
         If through sources alone connect a node, or a branch ends at nothing.
+
     """
     _check_through_cuts(graph)
     _check_open_ends(graph)
@@ -56,6 +58,7 @@ def check_symbols(graph: LinearGraph) -> None:
     GraphError
         If a parameter has the name of an element whose value is another one, or a source's input
         the name of an element's value or of a parameter.
+
     """
     elements: list[Branch | TwoPort] = [*graph.branches, *graph.two_ports]
     values = {e.name: e.value for e in elements if e.characteristic is None

@@ -49,6 +49,7 @@ def descriptor(structure: Structure, values: Sequence[Any], s: Any, one: Any, ou
     list of dict
         Column to entry, in the order of edges but those that are no unknowns; the input's column
         is the last.
+
     """
     unknown = {edge: at for at, edge in enumerate(
         (*structure.states, *structure.excess, *structure.algebraic))}
@@ -94,6 +95,7 @@ class Between:
     ----------
     rows, columns : tuple of int
         The output's row and the input's column are the last.
+
     """
 
     rows: tuple[int, ...]
@@ -114,6 +116,7 @@ def between(rows: list[Row]) -> Between:
     ------
     GraphError
         If the system is singular whatever the parameters are.
+
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import maximum_bipartite_matching
@@ -171,6 +174,7 @@ def determinants(field: RationalField, rows: list[Row]) -> tuple[Any, Any]:
     ------
     GraphError
         If they would take too long.
+
     """
     left_over = MOST_PRODUCTS
 

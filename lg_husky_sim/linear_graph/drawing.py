@@ -50,6 +50,7 @@ def draw_graph(axes: Any, graph: LinearGraph, *, culprits: Collection[str] = (),
     ------
     GraphError
         If the graph has no normal tree, or a marked name is not in it.
+
     """
     known = {*graph.names, *(edge.name for edge in graph.edges)}
     for name in (*culprits, *new):
@@ -190,6 +191,7 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
         If a file is there that is no such picture.
     OSError
         If the file cannot be written.
+
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:

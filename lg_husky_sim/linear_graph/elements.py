@@ -122,6 +122,7 @@ class Characteristic:
     ------
     GraphError
         If the law cannot be read, or its arguments and parameters do not fit it.
+
     """
 
     law: str
@@ -192,6 +193,7 @@ class Branch:
     ------
     GraphError
         If a field cannot be right whatever the graph is.
+
     """
 
     name: str
@@ -303,6 +305,7 @@ class TwoPort:
     ------
     GraphError
         If a field cannot be right whatever the graph is.
+
     """
 
     name: str

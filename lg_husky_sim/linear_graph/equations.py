@@ -40,6 +40,7 @@ class Sum:
         Variables that are equal to the sum (several where they are all equal).
     right : tuple of (int, str)
         Signs and variables; empty for zero.
+
     """
 
     left: tuple[str, ...]
@@ -79,6 +80,7 @@ class Equations:
         Kirchhoff's laws for passive tree branches and passive links.
     constitutive : tuple of Constitutive
         One or two (two-ports) an element.
+
     """
 
     tree: NormalTree
@@ -132,6 +134,7 @@ def equations(graph: LinearGraph, *, by_element: bool = False) -> Equations:
     ------
     GraphError
         If the graph has no normal tree.
+
     """
     structure = analyse(graph)
     texts = {value.owner: value.owner if by_element else value.text
@@ -279,6 +282,7 @@ def state_equations(model: SymbolicStateSpace) -> tuple[str, ...]:
     -------
     tuple of str
         ``d x/dt = ...`` for each state, then ``y = ...`` for each output that is not a state.
+
     """
     lines = []
     columns = (*model.states, *model.inputs, *(f'd {name}/dt' for name in model.inputs),

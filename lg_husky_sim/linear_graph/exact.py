@@ -65,6 +65,7 @@ def exact_fraction(structure: Structure, values: Mapping[str, float], source: in
     tuple of sympy.Poly
         In ``s`` over the rational numbers, without common factors; the denominator's first
         coefficient is 1.
+
     """
     import sympy
     from sympy import QQ
@@ -172,6 +173,7 @@ class Fraction:
         Coefficients, highest power of s first; the denominator's first is 1.
     zeros, poles : numpy.ndarray of complex
         [1/s].
+
     """
 
     numerator: FloatArray
@@ -214,6 +216,7 @@ def coefficients(polynomial: Any) -> FloatArray:
     ------
     ParameterError
         If they are too large for floating-point numbers.
+
     """
     try:
         return np.array([float(value) for value in polynomial.all_coeffs()])

@@ -42,6 +42,7 @@ def linear(space: StateSpace) -> StateSpace:
     ------
     SettingsError
         If the outputs depend on the rate of change of an input: such a model is not proper.
+
     """
     proper = space.standard_form()
     if proper.F.any():
@@ -93,6 +94,7 @@ def to_control(space: StateSpace) -> Any:
         If python-control is not installed.
     SettingsError
         If the model is not proper.
+
     """
     require('control', 'make a python-control system')
     import control
@@ -110,6 +112,7 @@ def to_scipy(space: StateSpace) -> Any:
     ------
     SettingsError
         If the model is not proper.
+
     """
     from scipy.signal import StateSpace as Linear
 
@@ -141,6 +144,7 @@ def export(space: StateSpace, path: str | os.PathLike[str], name: str = 'model',
     ------
     SettingsError
         If the ending is unknown, or the format cannot hold the model.
+
     """
     place = Path(path)
     check_export(place)
@@ -160,6 +164,7 @@ def check_export(path: Path) -> None:
     ------
     SettingsError
         If the ending is unknown, or something else than an export is there.
+
     """
     if path.suffix.lower() not in _WRITERS:
         raise SettingsError(f'cannot export to {path}: the ending must be one of '

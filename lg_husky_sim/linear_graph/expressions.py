@@ -72,6 +72,7 @@ def parse(text: str) -> ast.expr:
     ------
     GraphError
         If the text is no such expression, or a constant in it cannot be evaluated.
+
     """
     if len(text) > MAX_LENGTH:
         raise GraphError(f'expression of {len(text)} characters is longer than {MAX_LENGTH}')
@@ -102,6 +103,7 @@ def _constant(node: ast.expr) -> float | None:
     ------
     OverflowError, ZeroDivisionError, ValueError
         If such an expression, or one inside it, has no finite real value.
+
     """
     value: float | complex | None = None
     match node:
@@ -218,6 +220,7 @@ def evaluate(text: str, values: Mapping[str, float]) -> float:
     ------
     NameError, ZeroDivisionError, ValueError, OverflowError
         As Python's arithmetic raises them.
+
     """
     # only what parse() has checked is ever compiled
     return float(eval(compile_tuple((text,)), dict(GLOBALS), dict(values))[0])  # noqa: S307
@@ -259,6 +262,7 @@ def linear_coefficients(text: str, variables: tuple[str, ...]) -> dict[str, str]
     dict or None
         Coefficient (an expression free of the variables) of each variable that occurs;
         None if the expression is not linear, or has a constant term.
+
     """
     coefficients = _linear(text, frozenset(variables))
     return None if coefficients is None else dict(coefficients)

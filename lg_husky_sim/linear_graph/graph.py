@@ -40,6 +40,7 @@ class Edge:
         What the edge belongs to.
     port : int
         0 for a branch, 1 or 2 for a port.
+
     """
 
     name: str
@@ -83,6 +84,7 @@ class LinearGraph:
         has no ground, a mass is not referred to ground, across sources form a loop, or a
         characteristic names an unknown variable. What only a finished graph must have (no open
         ends, no node on through sources alone) is checked when the graph is derived.
+
     """
 
     branches: tuple[Branch, ...]
@@ -121,6 +123,7 @@ class LinearGraph:
         ------
         GraphError
             If the domain has none.
+
         """
         if isinstance(self.ground, str):
             return domain, self.ground
@@ -157,6 +160,7 @@ class LinearGraph:
         ------
         GraphError
             If there is no such edge; the message suggests a close name.
+
         """
         at = self._index.get(name)
         if at is None:
@@ -175,6 +179,7 @@ class LinearGraph:
         ------
         GraphError
             If it names no variable of this graph.
+
         """
         match = _VARIABLE.fullmatch(text) if isinstance(text, str) else None
         if match is None:
@@ -212,6 +217,7 @@ class LinearGraph:
             If the result is no valid graph.
         TypeError
             If something else is given.
+
         """
         for element in elements:
             if not isinstance(element, Branch | TwoPort):
@@ -229,6 +235,7 @@ class LinearGraph:
         ------
         GraphError
             If there is no such element, or the rest is no valid graph.
+
         """
         for name in names:
             self._require(name)
@@ -244,6 +251,7 @@ class LinearGraph:
         ------
         GraphError
             If there is no such element, or it is of the other sort (branch, two-port).
+
         """
         self._require(element.name)
         if isinstance(element, Branch) == (element.name in {t.name for t in self.two_ports}):
@@ -275,6 +283,7 @@ class LinearGraph:
         -------
         numpy.ndarray, shape (n_nodes - n_grounds, n_edges)
             +1 where the edge leaves the node, -1 where it enters; grounds left out.
+
         """
         import numpy as np
 

@@ -24,6 +24,7 @@ class Law:
         How many it takes.
     about : str
         What it is, with its source.
+
     """
 
     expression: str
@@ -59,6 +60,7 @@ def expression_of(law: str, arguments: int, parameters: tuple[str, ...]) -> str:
     GraphError
         If a named law takes another number of arguments or parameters, or the text is neither
         the name of a law nor an expression.
+
     """
     known = LAWS.get(law)
     if known is None:

@@ -70,6 +70,7 @@ class Block:
         All nodes but the ground.
     edges : dict of str to Curve
         All branches and ports.
+
     """
 
     domain: Domain
@@ -109,6 +110,7 @@ def layout(graph: LinearGraph) -> tuple[Block, ...]:
     -------
     tuple of Block
         In drawing units; rows run downwards from y = 0.
+
     """
     blocks = [_block(graph, edges) for edges in _parts(graph)]
     rows: list[list[Block]] = [[]]

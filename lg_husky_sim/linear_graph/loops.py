@@ -37,6 +37,7 @@ def effort_order(direct: NDArray[np.bool_], counts: Sequence[int], efforts: Sequ
     ------
     GraphError
         If there is a loop, naming it; or any such dependence unless ``chained``.
+
     """
     owners = [effort for effort, count in enumerate(counts) for _ in range(count)]
     causes: dict[int, dict[int, str]] = {effort: {} for effort in range(len(efforts))}

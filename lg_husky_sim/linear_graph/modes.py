@@ -38,6 +38,7 @@ class Modes:
     ----------
     factors, poles : numpy.ndarray of complex, shape (n,)
     powers : numpy.ndarray of int, shape (n,)
+
     """
 
     factors: ComplexArray
@@ -103,6 +104,7 @@ class StepFigures:
         Value that none later is larger than, and its time [s].
     complete : bool
         False if the response swings too often until it settles.
+
     """
 
     rise: float | None = None
@@ -127,6 +129,7 @@ def step_figures(modes: Modes, final: float, end: float) -> StepFigures:
         What it settles at; NaN if it does not.
     end : float
         Where to stop if it does not settle [s].
+
     """
     if (modes.poles.real > STANDING * np.abs(modes.poles)).any():
         return StepFigures()        # it grows

@@ -87,6 +87,7 @@ class Elimination:
     ----------
     matrix : array_like of int, shape (n_rows, n_columns)
         One equation a row.
+
     """
 
     def __init__(self, matrix: IntArray) -> None:
@@ -102,6 +103,7 @@ class Elimination:
         bool
             False if no unused equation contains it: it is then free, given the columns
             eliminated so far.
+
         """
         candidates = np.flatnonzero(self._rows[:, column])
         if candidates.size == 0:

@@ -82,6 +82,7 @@ class Netlist:
         Units of the parameters, as written.
     about : str
         Free text.
+
     """
 
     name: str
@@ -109,6 +110,7 @@ def read_netlist(path: str | Path) -> Netlist:
     ------
     ModelFileError
         If the file is no netlist; the message says which file, which element and what is wrong.
+
     """
     from lg_husky_sim.yaml_files import brief, read_yaml
 
@@ -129,6 +131,7 @@ def parse_netlist(text: str, source: str = 'netlist') -> Netlist:
         YAML.
     source : str
         What to call it in messages.
+
     """
     from lg_husky_sim.yaml_files import brief, parse_yaml
 
@@ -149,6 +152,7 @@ def netlist_of(data: Any, source: str = 'netlist') -> Netlist:
         As YAML gives it.
     source : str
         What to call it in messages.
+
     """
     from lg_husky_sim.yaml_files import brief
 

@@ -42,6 +42,7 @@ class RightHandSide:
         If the graph cannot be derived, a law hangs on itself, or an input is differentiated.
     ParameterError
         If a parameter is missing or not allowed.
+
     """
 
     def __init__(self, graph: LinearGraph, values: Mapping[str, float],
@@ -104,6 +105,7 @@ class RightHandSide:
         Returns
         -------
         numpy.ndarray, shape (n,)
+
         """
         rate: FloatArray = (self.space.A @ np.asarray(state)
                             + self.space.B @ self._inputs(inputs)

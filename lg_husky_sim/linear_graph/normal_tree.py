@@ -46,6 +46,7 @@ class NormalTree:
         Names of edges (ports as ``name.1``), in the graph's order.
     dependent : tuple of str
         Excess storages: A-types that had to be links, T-types that had to be in the tree.
+
     """
 
     tree: tuple[str, ...]
@@ -72,6 +73,7 @@ def normal_tree(graph: LinearGraph) -> NormalTree:
         If a branch ends at nothing, sources contradict each other through two-ports, two-ports
         leave a variable open, or a law gives the variable that the rest of the graph already
         fixes.
+
     """
     check_complete(graph)
     in_tree = _one_ports_in_tree(graph)

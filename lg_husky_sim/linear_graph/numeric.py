@@ -61,6 +61,7 @@ def compile_numeric(graph: LinearGraph, outputs: Sequence[str] = (), *,
     ...     Branch('b', Kind.D_TYPE, Domain.TRANSLATIONAL, 'body', 'ground', 'b')))
     >>> compile_numeric(graph, ['v(m)']).at({'m': 2.0, 'b': 3.0}).A
     array([[-1.5]])
+
     """
     structure = analyse(graph, outputs)
     check_asked(structure)
@@ -82,6 +83,7 @@ class NumericModel:
     ----------
     order : tuple of int
         Positions of the efforts in an order in which they can be evaluated.
+
     """
 
     def __init__(self, structure: Structure, chained: bool = False) -> None:
@@ -171,6 +173,7 @@ class NumericModel:
         ------
         ParameterError
             If a parameter is missing or an element's value is not allowed.
+
         """
         try:
             # only what parse() has checked is ever compiled

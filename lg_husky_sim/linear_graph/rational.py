@@ -28,6 +28,7 @@ def to_sympy(text: str) -> Any:
     ------
     GraphError
         If it divides by zero whatever its parameters are.
+
     """
     import sympy
 
@@ -82,6 +83,7 @@ class RationalField:
     ----------
     texts : iterable of str
         Expressions of the graph.
+
     """
 
     def __init__(self, texts: Iterable[str]) -> None:
@@ -142,6 +144,7 @@ def solve(rows: list[Row], right: list[Row]) -> list[Row]:
     ------
     GraphError
         If the system is singular whatever the parameters are.
+
     """
     left = [dict(row) for row in rows]
     known = [dict(row) for row in right]

@@ -53,6 +53,7 @@ def text_report(title: str, steps: Equations, model: SymbolicStateSpace,
     ------
     ParameterError
         If a number is not allowed.
+
     """
     # Refuses numbers that are not allowed.
     poles = f'{_numbers(*numbers)}\n\n{_poles(*numbers)}' if numbers is not None else ''
@@ -151,6 +152,7 @@ def latex_report(title: str, steps: Equations, model: SymbolicStateSpace,
     Returns
     -------
     str
+
     """
     parts = [*(f'% {" ".join(text.split())}' for text in (title, note) if text), steps.latex,
              '% State-space model']

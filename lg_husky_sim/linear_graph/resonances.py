@@ -56,6 +56,7 @@ class Factors:
         Not zero.
     zeros, poles : numpy.ndarray of complex
         [1/s].
+
     """
 
     gain: float

@@ -37,6 +37,7 @@ def is_rounding(matrix: FloatArray, right: FloatArray, solution: FloatArray) -> 
     Parameters
     ----------
     matrix, right, solution : numpy.ndarray, shapes (n, n), (n, m), (n, m)
+
     """
     largest = np.abs(solution).max(initial=0.0)
     if not largest > SUSPICIOUS * np.abs(right).max(initial=0.0):
@@ -61,6 +62,7 @@ def culprits(matrix: FloatArray) -> tuple[int, ...]:
     -------
     tuple of int
         Positions.
+
     """
     if not np.isfinite(matrix).all():
         return tuple(range(len(matrix)))
@@ -86,6 +88,7 @@ def singular_error(graph: LinearGraph, owners: Sequence[str], values: Mapping[st
         Elements whose equations they are.
     values : mapping of str to float
         Value of each element.
+
     """
     two_ports = {two_port.name: two_port for two_port in graph.two_ports}
     ratios = [f'{name} = {values[name]:g}' for name in owners if name in two_ports]

@@ -31,6 +31,7 @@ def equation_forms(model: Any) -> tuple[str, ...]:
     -------
     tuple of str
         Of x, and of y and z where there are any.
+
     """
     found = []
     for names, left, *terms in _EQUATIONS:
@@ -64,6 +65,7 @@ class StateSpace:
         Arguments z of the efforts, one effort's after the other's.
     states, inputs, outputs, efforts, arguments : tuple of str
         Names of x (n), u (m), y (p), f (k) and z (q).
+
     """
 
     A: FloatArray
@@ -116,6 +118,7 @@ class StateSpace:
         -------
         StateSpace
             Same names; where E has a row that is not zero, the state is x - E u.
+
         """
         if not self.E.any():
             return self

@@ -38,6 +38,7 @@ class Value:
         The expression.
     rule : str
         'positive', 'not negative', 'not zero' or 'any'.
+
     """
 
     owner: str
@@ -62,6 +63,7 @@ class Term:
         +1 or -1.
     source : Variable
         The variable that is multiplied.
+
     """
 
     edge: int
@@ -110,6 +112,7 @@ class Structure:
         Edges of T-types whose value is a stiffness, the inverse of an inertance.
     outputs, arguments : tuple of Variable
         What is asked for, and the arguments of the efforts, one after the other.
+
     """
 
     graph: LinearGraph
@@ -182,6 +185,7 @@ def analyse(graph: LinearGraph, outputs: Sequence[str] = ()) -> Structure:
     ------
     GraphError
         If there is no normal tree, or an unknown output.
+
     """
     wanted = []
     for text in outputs:
@@ -216,6 +220,7 @@ def check_asked(structure: Structure) -> None:
     ------
     GraphError
         If there is neither a state nor an output.
+
     """
     if not structure.states and not structure.outputs:
         raise GraphError('the graph has no state: it needs an A-type or a T-type whose variable '

@@ -38,6 +38,7 @@ class SymbolicStateSpace:
         Names of x, u, y, f and z.
     dependent : tuple of str
         Excess storages, whose variables follow from the states.
+
     """
 
     graph: LinearGraph
@@ -110,6 +111,7 @@ def derive(graph: LinearGraph, outputs: Sequence[str] = (), *,
     GraphError
         As :func:`~lg_husky_sim.linear_graph.compile_numeric`; by element also if a parameter has
         the name of an element of another value, or an input that of either.
+
     """
     import sympy
 

@@ -42,6 +42,7 @@ def position(names: Sequence[str], name: str, what: str) -> int:
     ------
     GraphError
         If it is unknown, or must be given.
+
     """
     if name in names:
         return list(names).index(name)
@@ -75,6 +76,7 @@ def transfer_function(graph: LinearGraph, output: str, source: str, *, by_elemen
     ------
     GraphError
         If an element or a parameter is called ``s``, or the answer would be too long.
+
     """
     if by_element:
         check_symbols(graph)
@@ -177,6 +179,7 @@ def step_response(space: StateSpace, times: ArrayLike, source: int) -> FloatArra
         If the times are not equally spaced from 0.
     SettingsError
         If an output has the step's derivative in it.
+
     """
     from scipy.signal import lsim
 
@@ -211,6 +214,7 @@ def checked_times(times: ArrayLike) -> FloatArray:
     ------
     ParameterError
         If they are not equally spaced from 0.
+
     """
     t = _numbers(times)
     if t.ndim != 1 or t.size < 2 or t[0] != 0.0 or not t[1] > 0 or not np.allclose(
@@ -227,6 +231,7 @@ def checked_rates(rates: ArrayLike) -> FloatArray:
     ------
     ParameterError
         If there is none, or one that is negative or not finite.
+
     """
     found = np.atleast_1d(_numbers(rates))
     if found.ndim != 1 or not found.size or not (np.isfinite(found) & (found >= 0.0)).all():
@@ -263,6 +268,7 @@ def frequency_response(space: StateSpace, rates: ArrayLike, output: int, source:
     ------
     ParameterError
         If there is a pole at one of them.
+
     """
     found = []
     for rate in checked_rates(rates):

@@ -87,6 +87,7 @@ class Unit:
         Value of one such unit in SI.
     dimension : tuple of Fraction
         Powers of kg, m, s, A and K.
+
     """
 
     text: str
@@ -102,6 +103,7 @@ def parse_unit(text: str) -> Unit:
     ------
     GraphError
         If a part of it is no unit.
+
     """
     shown = repr(text)
     if not isinstance(text, str) or len(text) > 60:
@@ -195,6 +197,7 @@ def unit_needed(element: Branch | TwoPort) -> str:
     -------
     str
         For example ``'N·m·s/rad'``.
+
     """
     if isinstance(element, TwoPort):
         (one, *_), (two, *_) = element.port1, element.port2
@@ -235,6 +238,7 @@ def check_units(graph: LinearGraph, units: Mapping[str, str]) -> tuple[str, ...]
     ------
     GraphError
         For the first element with a wrong unit, saying what it has and what it needs.
+
     """
     unchecked = []
     elements: list[Branch | TwoPort] = [*graph.branches, *graph.two_ports]
@@ -325,6 +329,7 @@ def dimension_of(node: ast.expr, known: Mapping[str, Dimension]) -> Dimension:
     ------
     GraphError
         If unlike things are added, or a function gets more than a pure number.
+
     """
     match node:
         case ast.Constant():

@@ -79,6 +79,7 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
     ------
     LgHuskyError
         If features are damaged, or no outcome has any.
+
     """
     rows: dict[str, list[list[float]]] = {name: [] for name in COEFFICIENTS}
     right: dict[str, list[float]] = {name: [] for name in COEFFICIENTS}

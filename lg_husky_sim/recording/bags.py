@@ -58,6 +58,7 @@ class Bag:
             Log time [ns].
         message : object
             With the fields of its ROS type.
+
         """
         places = {(topic.name, topic.kind): place for place, topic in enumerate(wanted)}
         connections = [connection for connection in self._reader.connections
@@ -93,6 +94,7 @@ def open_bag(path: Path) -> Iterator[Bag | Rosbag2]:
         the bag is open becomes this error.
     MissingExtraError
         If neither `rosbags` nor ROS's `rosbag2_py` is installed.
+
     """
     by_ros = find_spec('rosbags') is None and available()
     if not by_ros:
@@ -134,6 +136,7 @@ def bags_in(path: Path) -> list[Path]:
     list of pathlib.Path
         The bag itself, whether or not it can be read; of a folder that is no bag, those in it,
         sorted by name: rosbag2 folders, and ROS 1 files where there are several.
+
     """
     if not path.is_dir() or _is_bag2(path):
         return [path]

@@ -34,6 +34,7 @@ def clean(name: str, times: FloatArray, values: FloatArray, notes: list[str]) ->
     times : numpy.ndarray, shape (m,)
         Strictly increasing.
     values : numpy.ndarray, shape (m, k)
+
     """
     order = np.argsort(times, kind='stable')
     if np.any(np.diff(times) < 0.0):
@@ -83,6 +84,7 @@ def wheel_streams(times: FloatArray, values: FloatArray, notes: list[str]) -> di
     dict of str to (times, values)
         ``wheels`` [rad/s], derived from the angles where no rate was recorded;
         ``wheel_angles`` [rad] and ``wheel_torques`` [N·m] where recorded.
+
     """
     streams: dict[str, Sample] = {}
     for name, first in (('wheels', 0), ('wheel_angles', 2), ('wheel_torques', 4)):
@@ -117,6 +119,7 @@ def joined(left: Sample, right: Sample) -> Sample:
     -------
     times : numpy.ndarray, shape (k,)
     values : numpy.ndarray, shape (k, 2)
+
     """
     times, values = left
     if not times.size or not right[0].size:

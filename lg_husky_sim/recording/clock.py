@@ -46,6 +46,7 @@ class Stamps:
         Log times [ns].
     header : numpy.ndarray of int64, shape (n,)
         Header stamps [ns]; 0 where there is none.
+
     """
 
     logged: IntArray
@@ -80,6 +81,7 @@ def common_clock(streams: Mapping[str, Stamps]) -> tuple[dict[str, IntArray], li
     ------
     RecordingError
         If the times span more than 30 days.
+
     """
     notes: list[str] = []
     headers = _headers(streams, notes)

@@ -24,6 +24,7 @@ def check_driven(recordings: Sequence[Recording]) -> None:
     ------
     RecordingError
         If all are, or one has no commands.
+
     """
     if not any(np.any(recording.stream('command').values) for recording in recordings):
         raise RecordingError(f'{", ".join(r.name for r in recordings)}: all commands are zero; a '

@@ -50,6 +50,7 @@ def told_apart(edges: Collection[Edge]) -> dict[Edge, Edge]:
     dict of (parent, child) to (parent, child)
         Plain names to those given; where the plain ones do not tell all apart, or the frames
         are those of several robots, those given to themselves.
+
     """
     plain = {(plain_frame(parent), plain_frame(child)): (parent, child)
              for parent, child in edges}
@@ -98,6 +99,7 @@ def pose_chain(
     ------
     RecordingError
         If a frame wished for is not there, or no way leads to it.
+
     """
     tree = sorted(edges)
     if odom_frame or base_frame:
@@ -131,6 +133,7 @@ def compose(
     times : numpy.ndarray, shape (n,)
     values : numpy.ndarray, shape (n, 3)
         x, y, heading of the last child in the first parent.
+
     """
     ways = [series[edge] for edge in chain]
     times = max((way[0] for way in ways), key=lambda stamps: stamps.size)

@@ -30,6 +30,7 @@ class Messages:
         What makes a message from its fields in order, by the full name of its type.
     frames : tuple of str
         Parent and child frame of the pose.
+
     """
 
     def __init__(self, types: Mapping[str, Callable[..., Any]], frames: tuple[str, str]) -> None:

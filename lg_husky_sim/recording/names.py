@@ -33,6 +33,7 @@ def named_apart(*groups: Sequence[Recording]) -> tuple[tuple[Recording, ...], ..
     ------
     RecordingError
         If a recording is given twice.
+
     """
     everything = [recording for group in groups for recording in group]
     places = [os.path.realpath(recording.path) for recording in everything if recording.path]
@@ -68,6 +69,7 @@ def named_as_in(recordings: Sequence[Recording], known: Collection[str]
     -------
     tuple of Recording
         Each with the longest known name that its place ends in; with its own if there is none.
+
     """
     found = []
     for recording in recordings:

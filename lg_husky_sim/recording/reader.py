@@ -75,6 +75,7 @@ def read_recording(path: str | PathLike[str], topics: TopicMap | None = None) ->
         nothing in it is of use; the last two list what is there.
     MissingExtraError
         If the package `rosbags` is not installed.
+
     """
     place = Path(path)
     if place.name == 'metadata.yaml':

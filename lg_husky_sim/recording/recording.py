@@ -54,6 +54,7 @@ class Recording:
         Every topic in the bag with its message type.
     notes : tuple of str
         What had to be repaired or left out, in plain words.
+
     """
 
     name: str
@@ -90,6 +91,7 @@ class Recording:
         ------
         RecordingError
             If it was not recorded; the message lists what was.
+
         """
         if name not in self.streams:
             there = ', '.join(f'{topic} ({kind})' for topic, kind in sorted(self.present.items()))
@@ -121,6 +123,7 @@ class Segment:
     streams : mapping of str to TimeSeries
         The recording's streams within the bounds, times on the recording's clock. The command
         that holds at `start` is its first row, even when it was sent before.
+
     """
 
     recording: str
@@ -147,6 +150,7 @@ def check_stream(name: str, series: TimeSeries) -> None:
     ------
     RecordingError
         If it is unknown, or its channels are others.
+
     """
     if name not in CHANNELS:
         raise RecordingError(f'unknown stream {name!r}; known are {", ".join(CHANNELS)}')
@@ -180,6 +184,7 @@ def segments(recording: Recording, gap: float = DEFAULT_GAP) -> tuple[Segment, .
     ------
     RecordingError
         If `gap` is not positive.
+
     """
     if not gap > 0.0:
         raise RecordingError(f'gap = {gap} s must be positive')
@@ -217,6 +222,7 @@ def driven_segments(recording: Recording, gap: float = DEFAULT_GAP
         commands: only a gap of the commands ends it.
     int
         Commands that are left out: no state of the robot is known before they were given.
+
     """
     found, commands = segments(recording, gap), recording.streams['command']
     extended: list[Segment] = []
@@ -255,6 +261,7 @@ def windows(segment: Segment, length: float) -> tuple[Segment, ...]:
     ------
     RecordingError
         If `length` is not positive.
+
     """
     if not length > 0.0:
         raise RecordingError(f'length = {length} s of a window must be positive')
@@ -280,6 +287,7 @@ def cut(
     Returns
     -------
     dict of str to TimeSeries
+
     """
     parts = {name: _part(name, series, start, end) for name, series in streams.items()}
     return {name: part for name, part in parts.items() if len(part)}

@@ -39,6 +39,7 @@ class Rosbag2:
     ------
     RecordingError
         If it is a bag of ROS 1.
+
     """
 
     def __init__(self, files: Sequence[Path], notes: Sequence[str] = ()) -> None:
@@ -78,6 +79,7 @@ class Rosbag2:
             Log time [ns].
         message : object
             With the fields of its ROS type.
+
         """
         places = {topic.name: place for place, topic in enumerate(wanted)}
         find: Any = import_module('rosidl_runtime_py.utilities').get_message
@@ -130,6 +132,7 @@ class Rosbag2Output:
         Folder to make.
     storage : str
         ``mcap`` or ``sqlite3``.
+
     """
 
     def __init__(self, path: Path, storage: str) -> None:

@@ -73,6 +73,7 @@ class TopicMap:
         Parent and child frame of the pose in a tf topic.
     left_wheels, right_wheels : str
         Joints of each side, separated by commas, where their names do not tell it.
+
     """
 
     command: str = ''
@@ -96,6 +97,7 @@ class TopicMap:
         ------
         RecordingError
             If only one side was, or a joint for both.
+
         """
         left, right = (tuple(name.strip() for name in side.split(',') if name.strip())
                        for side in (self.left_wheels, self.right_wheels))
@@ -125,6 +127,7 @@ class TopicMap:
         ------
         RecordingError
             If one is not of that form, or its role is unknown.
+
         """
         known = [entry.name for entry in fields(cls)]
         chosen = cls()
@@ -161,6 +164,7 @@ class Robots:
     beside : tuple of str
         What looks like a robot but is none by itself, such as a camera with IMU and odometry:
         it serves only where the robot has no topic of its own.
+
     """
 
     home: str | None = None
@@ -187,6 +191,7 @@ def robots(present: Iterable[Topic], chosen: TopicMap) -> Robots:
     Returns
     -------
     Robots
+
     """
     roles = _roles(tuple(present))
     found = [space for space in roles
@@ -296,6 +301,7 @@ def candidates(
     ------
     RecordingError
         If the topic chosen by hand is not there, is empty or has a type of no use.
+
     """
     topics = tuple(present)
     if chosen:

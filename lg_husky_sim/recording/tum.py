@@ -36,6 +36,7 @@ def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0)
     ------
     SettingsError
         If something else is there.
+
     """
     place = Path(path)
     check_ours(place, HEAD)

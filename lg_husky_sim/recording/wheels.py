@@ -41,6 +41,7 @@ def wheel_sides(names: Sequence[str], count: int) -> Sides | None:
     -------
     tuple of two tuples of int, or None
         Places of the left and of the right wheels; None if one side has none.
+
     """
     return _sides(tuple(names), count)
 
@@ -85,6 +86,7 @@ def passed_over(names: Iterable[str]) -> list[str]:
     list of str
         Those with a side that are not called wheels, such as a gripper's, and wheels without a
         side; sorted.
+
     """
     return sorted(name for name in names
                   if _driven(name) and ('wheel' in name.lower()) != bool(_side(name.lower())))
@@ -105,6 +107,7 @@ def side_means(values: Sequence[float] | FloatArray, sides: Sides) -> tuple[floa
     -------
     tuple of float
         Left and right; NaN where no value is there.
+
     """
     count = len(values)
     if not count:
@@ -136,6 +139,7 @@ def rates_from_angles(
         Middles of the intervals [s], for a difference is the mean rate over its interval.
     rates : numpy.ndarray, shape (n - 1, 2)
         Wheel rates [rad/s].
+
     """
     steps = np.diff(times)
     rates: NDArray[np.float64] = np.diff(unwrapped(angles), axis=0) / steps[:, None]
@@ -154,6 +158,7 @@ def unwrapped(angles: FloatArray) -> FloatArray:
     Returns
     -------
     numpy.ndarray, shape (n, k)
+
     """
     wraps = (angles.size > 0 and float(np.max(np.abs(angles))) <= WRAP
              and bool(np.any(np.abs(np.diff(angles, axis=0)) > np.pi)))
@@ -179,6 +184,7 @@ def unwrapped_means(
     numpy.ndarray, shape (n, 2), or None
         Left and right [rad], NaN where no value is there; None where the joints of a side wrap
         together or not at all, so that nothing is to be mended.
+
     """
     means, apart = np.full((len(turned), 2), np.nan), False
     for side in (0, 1):

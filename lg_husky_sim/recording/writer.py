@@ -72,6 +72,7 @@ def write_recording(
         If something is at `path` already, a stream is unknown or the storage is.
     MissingExtraError
         If neither `rosbags` nor ROS's `rosbag2_py` is installed.
+
     """
     for name, series in streams.items():
         check_stream(name, series)
@@ -120,6 +121,7 @@ def write_signals(
         If something is at `path` already, or the storage is unknown.
     MissingExtraError
         If neither `rosbags` nor ROS's `rosbag2_py` is installed.
+
     """
     def makers(types: Types) -> list[Maker]:
         messages = Messages(types, (frame, ''))
@@ -159,6 +161,7 @@ def check_target(path: Path, *, overwrite: bool = False) -> None:
     ------
     RecordingError
         If something is there, unless it is a rosbag2 and `overwrite` is set.
+
     """
     if not path.exists() and not path.is_symlink():
         return

@@ -45,6 +45,7 @@ def filled(sentences: Iterable[str], values: Mapping[str, float | str]) -> tuple
     -------
     tuple of str
         Without the sentences that name something that was not found.
+
     """
     known = {name: _Number(value) if isinstance(value, float) else value
              for name, value in values.items()}

@@ -54,6 +54,7 @@ class Trace:
         Standard deviation expected of measured − predicted [unit of the channel].
     errors : mapping of str to numpy.ndarray, shape (n,)
         By column, of x and y: in the frame of the robot at the start of each segment.
+
     """
 
     recording: str
@@ -104,6 +105,7 @@ def diagnosis_trace(
     Returns
     -------
     Trace
+
     """
     predicted = {NOMINAL: nominal, RECALIBRATED: recalibrated}
     if with_finding is not None:
@@ -124,6 +126,7 @@ class ErrorRow:
         By column; not a number, or absent, where it is not known.
     low, high : float
         95 % interval of the change from the reference to the last column, as a factor.
+
     """
 
     name: str
@@ -149,6 +152,7 @@ class ErrorTable:
     note : str
     folded : bool
         Whether the reader opens it first.
+
     """
 
     title: str
@@ -175,6 +179,7 @@ class Headline:
     sentences : tuple of str
     warnings : tuple of str
         What speaks against the answer; it stands above everything else.
+
     """
 
     text: str
@@ -204,6 +209,7 @@ class View:
         On the recording's clock [s].
     onset : float
         Marked [s]; not a number for none.
+
     """
 
     recording: str
@@ -238,6 +244,7 @@ class ParameterRow:
     least, most : float
         What the fit allows [unit]; not a number without a bound.
     at_bound : bool
+
     """
 
     name: str
@@ -263,6 +270,7 @@ class Provenance:
     command : str
     inputs : tuple of (str, str, str)
         Kind (recording, model), name, and SHA-256 of the content.
+
     """
 
     version: str = ''
@@ -300,6 +308,7 @@ class ReportData:
     files : tuple of (str, str)
         Files beside the page, and what they are for.
     provenance : Provenance
+
     """
 
     title: str

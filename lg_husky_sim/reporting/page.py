@@ -78,6 +78,7 @@ def error_cells(table: ErrorTable) -> Table:
     -------
     Table
         Without a column to compare with, the smallest error of a row is marked.
+
     """
     head = ['error', *table.columns]
     if table.compared:
@@ -201,6 +202,7 @@ def page(data: ReportData, view: View | None, images: Mapping[str, bytes],
     -------
     str
         HTML.
+
     """
     from jinja2 import Environment, PackageLoader
     from markupsafe import Markup

@@ -41,6 +41,7 @@ def packed_library() -> str:
     -------
     str
         Some 2 MB of letters that need no escaping.
+
     """
     if find_spec('plotly') is None:
         return ''
@@ -100,6 +101,7 @@ def payload(data: ReportData, view: View | None, jumps: Mapping[int, int]) -> st
     -------
     str
         Without the letter ``<``, so that nothing in it can end the script element.
+
     """
     recordings, traces = list(data.recordings), shown_traces(data)
     styles = column_styles(data.columns)

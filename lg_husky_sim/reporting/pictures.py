@@ -56,6 +56,7 @@ def png(figure: Figure, about: Mapping[str, str] | None = None) -> bytes:
     Returns
     -------
     bytes
+
     """
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
@@ -110,6 +111,7 @@ def draw_signal(axes: Axes, trace: Trace, styles: Mapping[str, LineStyle],
         Stretch that is shown, on the recording's clock [s].
     errors : bool
         Whether measured − predicted is drawn in place of the signals.
+
     """
     shown = (trace.times >= start) & (trace.times <= end)
     times, lines = trace.times[shown], []
@@ -148,6 +150,7 @@ def first_picture(data: ReportData, view: View) -> Figure:
     Returns
     -------
     matplotlib Figure
+
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -189,6 +192,7 @@ def responses_picture(data: ReportData, recording: str, longest: float = LONGEST
     Returns
     -------
     matplotlib Figure
+
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -238,6 +242,7 @@ def path_picture(data: ReportData, recording: str, longest: float = LONGEST,
     Returns
     -------
     matplotlib Figure
+
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -278,6 +283,7 @@ def draw_path(axes: Axes, x: Trace, y: Trace, styles: Mapping[str, LineStyle],
         By column, in the order of drawing.
     end : float
         Last time that is drawn [s].
+
     """
     shown = x.times <= end
     axes.plot(x.measured[shown], y.measured[shown], color=MEASURED_COLOUR, linewidth=2.6,
@@ -316,6 +322,7 @@ def draw_intervals(axes: Axes, numbers: Sequence[tuple[str, str, float, float, f
     axes : matplotlib Axes
     numbers : sequence of (str, str, float, float, float)
         Name, unit, estimate, low and high of each.
+
     """
     for row, (_, _, value, low, high) in enumerate(numbers):
         scale = max(abs(value), 1e-12)
@@ -341,6 +348,7 @@ def chart_picture(chart: Chart) -> Figure:
     Returns
     -------
     matplotlib Figure
+
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure

@@ -33,6 +33,7 @@ def content_hash(path: str | os.PathLike[str]) -> str:
     -------
     str
         In hexadecimal; empty where there is nothing to read.
+
     """
     place = Path(path)
     total = hashlib.sha256()
@@ -78,6 +79,7 @@ def provenance(recordings: Iterable[tuple[str, str | os.PathLike[str]]],
     Returns
     -------
     Provenance
+
     """
     return Provenance(package_version(), command or given_command(), tuple(
         (kind, name, content_hash(path))

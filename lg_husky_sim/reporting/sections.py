@@ -54,6 +54,7 @@ class Line:
         Half the width of a band around it.
     dots : bool
         Points in place of a line.
+
     """
 
     label: str
@@ -101,6 +102,7 @@ class Section:
         Text in fixed width.
     folded : bool
         Whether the reader opens it first.
+
     """
 
     heading: str

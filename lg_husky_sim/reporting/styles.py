@@ -72,6 +72,7 @@ def column_styles(columns: Sequence[str]) -> dict[str, LineStyle]:
     dict of str to LineStyle
         The columns of a diagnosis and of a fit always look the same; others take the palette in
         order.
+
     """
     return {name: _FIXED.get(name, LineStyle(*PALETTE[place % len(PALETTE)],
                                              'dash' if place >= len(PALETTE) else 'solid'))

@@ -40,6 +40,7 @@ def thinned(trace: Trace, most: int) -> Trace:
     Trace
         The smallest and largest measured value of each short stretch are kept, those of the
         first and last model's error too, and so is each gap.
+
     """
     count = trace.times.size
     if count <= most:
@@ -73,6 +74,7 @@ def paired(x: Trace, y: Trace, most: int) -> tuple[Trace, Trace]:
     -------
     tuple of Trace
         Every n-th sample.
+
     """
     step = -(-x.times.size // most)
     if step <= 1:
@@ -111,6 +113,7 @@ def longest_stretch(times: FloatArray, error: FloatArray, length: float) -> tupl
     -------
     tuple of float
         Start and end [s]; the whole signal where it is not longer.
+
     """
     known = times[np.isfinite(times)]
     if not known.size or known[-1] - known[0] <= length:

@@ -75,6 +75,7 @@ def number(value: float, digits: int = 3) -> str:
     str
         With powers of ten for very large and very small numbers; a dash for one that is not
         finite.
+
     """
     if not math.isfinite(value):
         return UNKNOWN
@@ -114,6 +115,7 @@ def with_interval(value: float, low: float, high: float, unit: str = '', word: s
     -------
     str
         In three significant digits, or so many that the estimate differs from both ends.
+
     """
     if not (math.isfinite(low) and math.isfinite(high)):
         return ' '.join(filter(None, (with_unit(value, unit), word)))

@@ -46,6 +46,7 @@ def check_extras() -> None:
     ------
     MissingExtraError
         If matplotlib or jinja2 is not installed.
+
     """
     require('matplotlib', 'draw figures')
     require('jinja2', 'write a page')
@@ -80,6 +81,7 @@ def write_report(data: ReportData, folder: Path, name: str = REPORT, *,
     ------
     MissingExtraError
         If matplotlib or jinja2 is not installed.
+
     """
     check_extras()
     images, captions, notes = drawn(data, pictured, on_progress)
@@ -106,6 +108,7 @@ def view_of(data: ReportData) -> View | None:
     -------
     View or None
         None without a trace of a rate.
+
     """
     if data.view is not None and data.trace(data.view.recording, data.view.channel):
         return data.view
@@ -160,6 +163,7 @@ def drawn(data: ReportData, pictured: int = MOST_PICTURED,
         Captions by name.
     list of str
         A line for each picture that could not be drawn.
+
     """
     images: dict[str, bytes] = {}
     captions: dict[str, str] = {}

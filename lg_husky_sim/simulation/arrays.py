@@ -49,6 +49,7 @@ class Packed(NamedTuple):
         Outputs of the plant, then the derivatives of yaw rate and speed: of modes, voltages and
         efforts.
     laws, coefficients, offsets : numpy.ndarray, shapes (n_sets, n_efforts[, laws.WIDTH])
+
     """
 
     stages: FloatArray
@@ -103,6 +104,7 @@ class Work(NamedTuple):
     arguments : numpy.ndarray, shape (ARGUMENT_ROWS, n_arguments)
     lanes : numpy.ndarray, shape (INTEGRALS + 2 n + 2 + n_efforts, LANES)
     few : numpy.ndarray, shape (FEW_ROWS, FEW)
+
     """
 
     modes: FloatArray

@@ -40,6 +40,7 @@ def make_ready(step: Callable[[], object], longest: float) -> bool:
     -------
     bool
         Whether steps are made in plain Python for now.
+
     """
     if not isinstance(follow, Kernel):
         step()

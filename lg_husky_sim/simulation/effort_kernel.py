@@ -260,6 +260,7 @@ def solve(plant: Packed, c: int, s: FloatArray, n: int, time: float, h: float, b
     -------
     float
         Error in parts of what is allowed; negative where the iteration does not converge.
+
     """
     n_real, n_pairs, count = plant.counts[c, REALS], plant.counts[c, PAIRS], plant.counts[
         c, EFFORTS]

@@ -209,6 +209,7 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
     -------
     int
         Steps taken; -1 where the model runs away, see :mod:`lg_husky_sim.simulation.runaway`.
+
     """
     n, size = plant.bases.shape[2], plant.bases.shape[3]
     modes, efforts, lanes, few = work.modes, work.efforts, work.lanes, work.few

@@ -52,6 +52,7 @@ class Events:
     ------
     ParameterError
         If a time is not finite or lies before the start, or nothing says where to start.
+
     """
 
     def __init__(self, commands: TimeSeries, times: ArrayLike, *, start: float | None = None,
@@ -88,6 +89,7 @@ class Propagator:
     Parameters
     ----------
     plant : Plant
+
     """
 
     def __init__(self, plant: Plant) -> None:
@@ -124,6 +126,7 @@ class Propagator:
         -------
         numpy.ndarray, shape (n + TAIL,)
             As of :meth:`InitialStates.run_in`.
+
         """
         flat = np.array(begin)
         run_kernel(flat, events.stamps, events.values, events.times, events.places,
@@ -155,6 +158,7 @@ class Propagator:
         -------
         numpy.ndarray, shape (n_times, 15)
             :data:`COLUMNS` at the events' times, in the order in which they were given.
+
         """
         flat = np.array(initial)
         flat[len(self.plant.states) + 6] = events.start
@@ -214,6 +218,7 @@ def trajectory(plant: Plant, commands: TimeSeries, times: ArrayLike, *,
     ------
     ParameterError
         If a time is not finite or lies before the start.
+
     """
     events = Events(commands, times, start=start)
     drive = Propagator(plant)

@@ -19,6 +19,7 @@ class InitialStates:
     Parameters
     ----------
     plant : Plant
+
     """
 
     def __init__(self, plant: Plant) -> None:
@@ -79,6 +80,7 @@ class InitialStates:
         -------
         numpy.ndarray, shape (n + TAIL,)
             Other states (currents, controllers) are those of the nearest steady drive.
+
         """
         pose, twist = pose or Pose(), twist or BodyTwist()
         one = self._set
@@ -118,6 +120,7 @@ class InitialStates:
         numpy.ndarray, shape (n + TAIL,)
             The latter's pose, rates and time; currents, controllers, belts and the stages of the
             command of the former.
+
         """
         n = self._set.a.shape[0]
         flat = np.array(before)

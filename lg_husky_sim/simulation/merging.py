@@ -37,6 +37,7 @@ def merged(plant: PlantSet) -> PlantSet:
     -------
     PlantSet
         The same set where no two efforts have the same law, coefficients and arguments.
+
     """
     ends = np.append(plant.offsets[1:], plant.h.shape[0])
     if plant.laws.size < 2:

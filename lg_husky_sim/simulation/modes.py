@@ -52,6 +52,7 @@ class Modes:
         x = out_of @ xi, xi = real modes, real and imaginary parts of the pairs.
     into : numpy.ndarray, shape (n_real + 2 n_pairs, n)
         xi = into @ x.
+
     """
 
     n_real: int
@@ -76,6 +77,7 @@ def modes_of(a: FloatArray, mixing: tuple[FloatArray, FloatArray] | None = None)
     -------
     Modes
         Of a matrix nearby (:data:`PERTURBATION`) where equal eigenvalues share an eigenvector.
+
     """
     n = a.shape[0]
     onto, back = (np.eye(n), np.eye(n)) if mixing is None else mixing
@@ -182,6 +184,7 @@ def packed(plant: Plant) -> Packed:
     Returns
     -------
     Packed
+
     """
     sets = tuple(merged(one) for one in plant.sets)
     n = sets[0].a.shape[0]

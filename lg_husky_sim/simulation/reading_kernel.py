@@ -187,6 +187,7 @@ def go(width: float, went: float, turned: float, few: FloatArray, lanes: FloatAr
     tuple of float
         The way along and across the last direction [m], the sine of the turn and what its cosine
         is less than one.
+
     """
     speed, rate = lanes[OUTPUTS + 2, g], lanes[OUTPUTS + 3, g]
     acceleration = lanes[OUTPUTS + ACCELERATION, g]

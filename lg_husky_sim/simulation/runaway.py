@@ -24,6 +24,7 @@ def refuse_runaway(steps: int) -> None:
     ParameterError
         If the base gets faster than :data:`RUNAWAY`: an effort that grows with the speed, as of
         a scrub less than that of no speed, has no other end.
+
     """
     if steps < 0:
         raise ParameterError(f'with these parameters the model is unstable: it exceeds '

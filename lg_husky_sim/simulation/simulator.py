@@ -34,6 +34,7 @@ class SimulatorState:
     waiting : numpy.ndarray, shape (n_waiting, 3)
         Commands that a dead time holds back: when each was given, before now [s], its forward
         speed [m/s] and yaw rate [rad/s]; read-only.
+
     """
 
     flat: FloatArray
@@ -110,6 +111,7 @@ class Simulator:
     ------
     ParameterError
         If the period is not a positive number.
+
     """
 
     def __init__(self, plant: Plant, period: float, *, fine_pose: bool = True) -> None:
@@ -148,6 +150,7 @@ class Simulator:
         -------
         SimulatorState
             Other states (currents, controllers) are those of the nearest steady drive.
+
         """
         pose, twist = pose or Pose(), twist or BodyTwist()
         if wheel_rates is None and (twist.forward or twist.yaw):
@@ -177,6 +180,7 @@ class Simulator:
         Returns
         -------
         SimulatorState
+
         """
         return self.run(state, np.array([[command.forward, command.yaw]]))[0]
 
@@ -197,6 +201,7 @@ class Simulator:
             At the end.
         numpy.ndarray, shape (n_steps, 15)
             The kernel's columns after each step.
+
         """
         flat, steps = np.array(state.flat), len(commands)
         out = np.empty((steps, len(COLUMNS)))
@@ -229,6 +234,7 @@ class Simulator:
             Where the states are others, wheel rates, velocity, currents, angles and pose
             are kept, and the others (front axles, a controller's states) are those of the steady
             drive that comes nearest.
+
         """
         n = len(self.plant.states)
         if state.states == self.plant.states:
@@ -267,6 +273,7 @@ def hold(commands: TimeSeries, start: float, period: float, count: int) -> Float
     Returns
     -------
     numpy.ndarray, shape (count, 2)
+
     """
     edges = start + period * np.arange(count + 1)
     values = np.column_stack([commands.column('forward'), commands.column('yaw')])
@@ -315,6 +322,7 @@ def rollout(plant: Plant, commands: TimeSeries, end: float, period: float = 0.02
     ------
     ParameterError
         If the period is not positive.
+
     """
     simulator = Simulator(plant, period)
     first = float(commands.times[0]) if start is None else start

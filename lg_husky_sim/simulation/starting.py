@@ -26,6 +26,7 @@ def at_rest(twist: BodyTwist, wheel_rates: tuple[float, float] | None = None) ->
         more noise than they have.
     wheel_rates : tuple of float, optional
         Left and right [rad/s].
+
     """
     if wheel_rates is not None:
         return max(map(abs, wheel_rates)) < SLOW_WHEEL
@@ -60,6 +61,7 @@ def commanded_until(start: float, commands: TimeSeries, twist: BodyTwist,
     -------
     BodyTwist
         Zero where nothing was commanded, or nothing that is known or remembered.
+
     """
     if (at_rest(twist, wheel_rates) or len(commands) == 0
             or commands.times[0] > start + SOON):

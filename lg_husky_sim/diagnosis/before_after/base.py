@@ -37,6 +37,7 @@ class Base:
         Index of the delay of the stream against which those of the others are.
     given : bool
         Whether the wheels turn as measured, which leaves the body's motion to be explained.
+
     """
 
     settings: Settings
@@ -94,6 +95,7 @@ def base_of(settings: Settings, nominal: Parameters, given: bool = False,
     Returns
     -------
     Base
+
     """
     start = [nominal[q.nominal] if q.start is None else q.start for q in settings.quantities]
     logs = [q.logarithmic for q in settings.quantities]

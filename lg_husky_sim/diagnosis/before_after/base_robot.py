@@ -348,6 +348,7 @@ def simulate(p: FloatArray, fixed: FloatArray, step: float, command: FloatArray,
         An entry of any value for each robot: the length of a tuple is known to the compiler.
     out : numpy.ndarray, shape (n + 1, 12, n_lanes)
         Filled with `OUTPUTS`.
+
     """
     z = np.zeros((ROWS, len(lanes)))
     half, keep = 0.5 * fixed[0], step / (step + fixed[4])

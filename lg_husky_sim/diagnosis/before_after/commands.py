@@ -34,6 +34,7 @@ def accepted(times: FloatArray, values: FloatArray, late: float, most: float, sl
         Of the first step, and its length [s].
     out : numpy.ndarray, shape (n_steps,)
         Filled.
+
     """
     now, target, place, k = start, 0.0, begin, 0
     while k < times.size and times[k] + late <= now:

@@ -44,6 +44,7 @@ class Candidate:
     chance : float
         Of such a gain, by this or any other change of the block, on a robot that has not
         changed.
+
     """
 
     change: Change
@@ -76,6 +77,7 @@ class Block:
         Log evidence of everything being different over that of no change [nats].
     chance : float
         Of a difference as large as that of everything on a robot that has not changed.
+
     """
 
     base: Base
@@ -111,6 +113,7 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     Returns
     -------
     Block
+
     """
     comparison = _Comparison(fits, adopted)
     n = comparison.index.size
@@ -178,6 +181,7 @@ def refitted(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chan
     -------
     RecordingFits
         The same where all that differs is fitted already.
+
     """
     quantities = fits.base.settings.quantities
     brought = {name for change in adopted for name in change.parameters
@@ -224,6 +228,7 @@ def partitions(names: Sequence[str], later: Collection[str], most: int, listed: 
     -------
     list of frozenset of str
         One of the two sets of each way.
+
     """
     names, given, size = sorted(names), frozenset(later), len(later)
     halves = 2 * size == len(names)

@@ -36,6 +36,7 @@ class Decision:
         Gain of letting everything differ where something changed that has no name [nats]; else 0.
     chance : float
         Of what is claimed, or gains most where nothing is, on a robot that has not changed.
+
     """
 
     named: Candidate | None
@@ -75,6 +76,7 @@ def named_by(body: Sequence[Candidate], whole: Sequence[Candidate],
     Returns
     -------
     Candidate or None
+
     """
     first, other = _settled(body, whole, numbers), _simplest(whole, numbers)
     if first is None or not is_beyond_chance(first, numbers):
@@ -124,6 +126,7 @@ def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
     Returns
     -------
     Decision
+
     """
     numbers = _shared(body, settings)
     bodily = () if body is None else body.candidates
@@ -165,6 +168,7 @@ def foremost(body: Block | None, loop: Block, settings: Settings) -> Decision | 
     Decision or None
         None where there is no difference beyond chance, or no name explains more of it than it
         leaves, and more than any other name.
+
     """
     numbers = _shared(body, settings)
     surest = _differing(body, loop, numbers)
@@ -195,6 +199,7 @@ def unnamed(body: Block | None, loop: Block, explained: float, settings: Setting
     -------
     Decision or None
         None where there is no difference beyond chance, or what is claimed explains enough of it.
+
     """
     numbers = _shared(body, settings)
     surest = _differing(body, loop, numbers)

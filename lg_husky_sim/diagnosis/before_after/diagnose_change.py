@@ -52,6 +52,7 @@ class ChangeCase:
         Of the later recordings.
     nominal : ModelFile
         The model in doubt.
+
     """
 
     diagnosis: Diagnosis
@@ -86,6 +87,7 @@ def diagnose_change(recordings: Sequence[Recording], baseline: Sequence[Recordin
     ------
     RecordingError
         If a recording cannot be used, or the robot is never driven in one of the sets.
+
     """
     return change_case(recordings, baseline, nominal, progress, jobs=jobs).diagnosis
 

@@ -50,6 +50,7 @@ def dispersed(base: Base, groups: Mapping[str, Sequence[Drive]], places: Mapping
     -------
     Noise
         With standard deviations that are larger by the root of the dispersion; none is smaller.
+
     """
     def parts(name: str) -> dict[str, tuple[float, float]]:
         return _scatter(base, groups[name], places[name], noise, prior)

@@ -27,6 +27,7 @@ class Bins:
         Index of each bin's first sample.
     values : numpy.ndarray, shape (n_bins, n_channels)
         Means of what was measured.
+
     """
 
     times: FloatArray
@@ -72,6 +73,7 @@ class Drive:
         By stream, in each bin or from one to the next (pose): squares of the yaw rate [(rad/s)^2]
         and of the acceleration of the wheels [(rad/s^2)^2], as measured about that time; NaN while
         nothing has been asked for.
+
     """
 
     recording: str
@@ -123,6 +125,7 @@ def drives(recording: Recording, step: float, widths: Mapping[str, float], settl
     Returns
     -------
     tuple of Drive
+
     """
     recording.stream('command')
     if not {'wheels', 'imu', 'pose'} & set(recording.streams):

@@ -29,6 +29,7 @@ class Quadratic:
     slope : numpy.ndarray, shape (n,)
     cost : float
         The constant c [nats].
+
     """
 
     recording: str
@@ -98,6 +99,7 @@ class Solution:
     shift : numpy.ndarray, shape (k,)
         What differs after.
     covariance : numpy.ndarray, shape (k, k)
+
     """
 
     evidence: float
@@ -122,6 +124,7 @@ class Evidence:
         Prior of a change.
     bounds : tuple of numpy.ndarray, optional
         Least and largest values, shapes (n,), of what has changed; none if not given.
+
     """
 
     quadratics: Sequence[Quadratic]
@@ -164,6 +167,7 @@ class Evidence:
         Returns
         -------
         Evidence
+
         """
         n, most = self.mean.size, self._apart(weight, rounds)
         found = replace(self, change_sd=free * self.change_sd)
@@ -265,6 +269,7 @@ class Evidence:
         float
             The least of the gains without each of the recordings, at the deviations from recording
             to recording that all have; of all recordings where a set has but one [nats].
+
         """
         return min(one.solve(changed).evidence - (
             one.solve(known).evidence if known.size else one.nothing)

@@ -39,6 +39,7 @@ class Prior:
     mean, sd : numpy.ndarray, shape (n,)
     free : numpy.ndarray of bool, shape (n,)
         Which are estimated; the others stay at the mean.
+
     """
 
     mean: FloatArray
@@ -63,6 +64,7 @@ class SetFit:
     cost : float
         Negative log posterior [nats], up to a constant of the noise; infinity where the
         simulation breaks down at the start.
+
     """
 
     z: FloatArray
@@ -116,6 +118,7 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
     Returns
     -------
     SetFit
+
     """
     lower, upper = base.bounds()
     z = np.clip(begin, lower, upper)

@@ -54,6 +54,7 @@ def chance_of_one(gain: float, own: Sequence[float], best: Sequence[float], coun
     -------
     float
         At most 1.
+
     """
     mean = max([numbers['null_gain'], *([sum(max(one, 0.0) for one in best) / len(best)]
                                         if best else [])])
@@ -87,6 +88,7 @@ def exchange_chance(gain: float, others: Sequence[float], numbers: Mapping[str, 
     Returns
     -------
     float
+
     """
     weight = numbers['null_weight']
     worth = len(others) if most is None else min(len(others), most)

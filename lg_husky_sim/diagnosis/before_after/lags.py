@@ -30,6 +30,7 @@ def lags_of(recordings: Sequence[Recording], baseline: Sequence[Recording], base
     mapping of str to numpy.ndarray, shape (n,)
         By recording, on the scale of the estimates; zero where they are as late as before, and for
         all but delays. Where both other streams are early, it is that of reference which is late.
+
     """
     known = {one.name: by_names(relations(segments(one))) for one in (*baseline, *recordings)}
     reference = base.names[base.reference].removesuffix('_late')

@@ -46,6 +46,7 @@ def with_limits(base: Base, drives: Sequence[Drive], noise: Noise, prior: Prior,
     Returns
     -------
     Quadratic
+
     """
     numbers, quantities = base.settings.fit, base.settings.quantities
     z, several = places[near.recording], np.array(list(places.values()))

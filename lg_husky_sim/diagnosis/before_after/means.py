@@ -35,6 +35,7 @@ def mean_in_bins(rows: FloatArray, first: int, start: float, step: float, times:
         and has not stopped where the simulation ends. Else they are those at the end.
     out : numpy.ndarray, shape (n_bins, k, n_lanes)
         Receives the means.
+
     """
     last = rows.shape[0] - 1.000001
     for b in range(edges.size):

@@ -88,6 +88,7 @@ def moved(base: Base, drive: Drive, robots: FloatArray, memory: Memory | None = 
     -------
     numpy.ndarray, shape (n_steps + 1, n_outputs, n_lanes)
         In columns as `OUTPUTS`; the first m lanes are those of the robots.
+
     """
     step, at = base.settings.simulation['step'], base.names.index
     lanes = (0,) * (1 if len(robots) == 1 else side_by_side(base))

@@ -52,6 +52,7 @@ def movements(path: FloatArray) -> FloatArray:
     Returns
     -------
     numpy.ndarray, shape (n - 1, 3, ...)
+
     """
     step = np.diff(path, axis=0)
     heading = 0.5 * (path[1:, 2] + path[:-1, 2])
@@ -78,6 +79,7 @@ def predicted(base: Base, drive: Drive, robots: FloatArray, motion: FloatArray
     -------
     dict of str to numpy.ndarray
         By stream, shape (n_bins, n_channels, m).
+
     """
     value = dict(zip(base.names, robots.T, strict=True))
     found = {}
@@ -157,6 +159,7 @@ def residuals(base: Base, drive: Drive, places: Sequence[FloatArray]
     -------
     list of dict of str to numpy.ndarray
         By stream, shape (n_bins, n_channels).
+
     """
     there = measured(base, drive)
     return [{name: there[name] - rows[..., k] for name, rows in should.items()}
@@ -196,6 +199,7 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
     mapping of str to numpy.ndarray
         Its derivatives, shape (n_bins, n_channels, n); zero where the simulation breaks down a
         step away.
+
     """
     quantities, upper = base.settings.quantities, base.bounds()[1]
     deltas = np.array([q.delta if place + q.delta <= most else -q.delta

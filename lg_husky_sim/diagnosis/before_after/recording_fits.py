@@ -55,6 +55,7 @@ class RecordingFits:
     quadratics : tuple of Quadratic
         The likelihood of each recording about its own fit, for all parameters.
     drives : tuple of Drive
+
     """
 
     base: Base
@@ -78,6 +79,7 @@ class RecordingFits:
         Returns
         -------
         RecordingFits
+
         """
         base, numbers = self.base, self.base.settings.fit
         groups = by_recording(self.drives)
@@ -127,6 +129,7 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
     Returns
     -------
     RecordingFits
+
     """
     numbers, quantities = base.settings.fit, base.settings.quantities
     free = np.array([not base.given or q.name in base.settings.body for q in quantities])

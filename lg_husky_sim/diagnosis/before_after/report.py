@@ -44,6 +44,7 @@ def change_report(case: ChangeCase, provenance: Provenance | None = None) -> Rep
     Returns
     -------
     ReportData
+
     """
     diagnosis = case.diagnosis
     plants = {NOMINAL: _plant(case.nominal), RECALIBRATED: _plant(diagnosis.plain_model)}

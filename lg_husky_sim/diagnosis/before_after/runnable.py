@@ -43,6 +43,7 @@ def started(nominal: ModelFile, base: Mapping[str, float], settings: Settings) -
     Returns
     -------
     ModelFile
+
     """
     parameters = nominal.parameters
     transmission = parameters['torque_constant'] * parameters['gear_ratio']
@@ -120,6 +121,7 @@ def carried(model: ModelFile, before: ModelFile, fit_before: ModelFile) -> Model
     Returns
     -------
     ModelFile
+
     """
     values = {}
     for name in FITTED:
@@ -163,6 +165,7 @@ def fitted(options: Sequence[ModelFile], segments: Sequence[Segment], evaluation
     -------
     ModelFile
         The same numbers where the fit breaks down.
+
     """
     first = compile_model(options[0].structure).at(options[0].parameters)
     sums = [channel_errors(s, replay(first, s)) for s in segments]

@@ -30,6 +30,7 @@ class Selection:
         What both blocks say where nothing is adopted, fitted with what gains most.
     claimed : Block
         What all channels say where the changes that are named are.
+
     """
 
     decisions: tuple[Decision, ...]
@@ -57,6 +58,7 @@ def select(compared: Compared, settings: Settings) -> Selection:
     Returns
     -------
     Selection
+
     """
     body, loop = compared((), ())
     body, loop = compared((), _bringing([

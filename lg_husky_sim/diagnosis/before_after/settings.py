@@ -36,6 +36,7 @@ class Quantity:
         difference quotient.
     lower, upper : float
         Bounds [unit].
+
     """
 
     name: str
@@ -82,6 +83,7 @@ class Change:
         In words.
     elements : tuple of str
         Of the linear graph.
+
     """
 
     effect: str
@@ -121,6 +123,7 @@ class Settings:
         Effect, its number and its side by which a model has a parameter of the base that changed.
     not_told : mapping of str to str
         Effects of the catalogue of which a change is not told, and why.
+
     """
 
     robot: tuple[Quantity, ...]
@@ -213,6 +216,7 @@ def settings() -> Settings:
     ------
     DiagnosisError
         If an entry is missing, unknown or no number.
+
     """
     path = config_path('before_after.yaml')
     content = read_yaml(path, DiagnosisError)

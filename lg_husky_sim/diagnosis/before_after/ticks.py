@@ -50,6 +50,7 @@ def at_own_ticks(fits: RecordingFits, pool: Threads) -> tuple[Drive, ...] | None
     -------
     tuple of Drive or None
         None where none are likelier than commands that are applied as they come.
+
     """
     search = _search(fits, fits.places, pool)
     rivals = search.likeliest() if any(

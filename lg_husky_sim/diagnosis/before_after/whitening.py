@@ -32,6 +32,7 @@ class Noise:
         Standard deviation of what the filter leaves at rest [unit of the channel].
     growth : mapping of str to numpy.ndarray, shape (2,)
         Of its variance [(rad/s)^-2, (rad/s^2)^-2]; none where it is left out.
+
     """
 
     filters: Mapping[str, FloatArray]
@@ -105,6 +106,7 @@ def noise_of(residuals: Sequence[Mapping[str, FloatArray]],
     -------
     Noise
         Channels that were not measured, or not as numbers, are left out.
+
     """
     order, filters, sizes, growth = int(settings.fit['filter']), {}, {}, {}
     for stream, names in CHANNELS.items():

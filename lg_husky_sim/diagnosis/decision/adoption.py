@@ -45,6 +45,7 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
     -------
     float
         At most 1.
+
     """
     count = float(tried)
     if hypothesis.onset is not None:
@@ -72,5 +73,6 @@ def evidence_beyond_chance(looks: int) -> float:
     -------
     float
         [nats]
+
     """
     return math.log(looks / setting('false_alarm_rate'))

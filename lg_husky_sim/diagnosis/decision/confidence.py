@@ -41,6 +41,7 @@ class Features:
         Evidence of a smooth effort beside the names over what these gain.
     chance : float
         Probability of such a gain on a robot that lacks nothing.
+
     """
 
     gain: float
@@ -62,6 +63,7 @@ def informs(verdict: Verdict, features: Features) -> tuple[float, ...]:
     tuple of float
         Bounded: what is below the least share, chance, or gain, or above the largest share, is
         told apart by nobody.
+
     """
     if verdict is Verdict.NOTHING_MISSING:
         return (math.log10(max(features.chance, setting('least_chance'))),)

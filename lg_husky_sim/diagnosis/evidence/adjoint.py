@@ -40,6 +40,7 @@ def scores(whitener: Whitener, weights: FloatArray) -> FloatArray:
     numpy.ndarray, shape (n_probe, 4)
         For a force [1/N], a moment and a torque on the left and right wheels [1/(N·m)] from each
         probe time of the drive to the next.
+
     """
     frame = whitener.frame
     grid = probe_times(frame.drive)

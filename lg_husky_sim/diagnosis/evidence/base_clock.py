@@ -41,6 +41,7 @@ def ticked_as(drive: Drive, known: Sequence[Drive]) -> Drive:
     Returns
     -------
     Drive
+
     """
     near = min((one for one in known if one.recording == drive.recording), default=None,
                key=lambda one: max(one.start - drive.start, drive.start - one.end))
@@ -76,6 +77,7 @@ def ticker_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Ticker
     -------
     Ticker or None
         None where no rate shows a step of a command.
+
     """
     delay = log.get('command_delay')
 
@@ -104,6 +106,7 @@ def ticking(evidence: Evidence, fit: Fit) -> list[list[Drive]]:
         recording more than in another, too little for it, are at ticks already, no drive tells,
         or rates are likelier without ticks.
         Whether these ticks make the drives likelier than none is for a fit to say.
+
     """
     # Where all commands of a recording are in step with the ticks, each has a delay of its own.
     own = [fit.point.log.get(d.own_lag) for d in evidence.drives]

@@ -25,6 +25,7 @@ def step_inside(normal: FloatArray, slope: FloatArray, low: FloatArray, high: Fl
     Returns
     -------
     numpy.ndarray, shape (k,)
+
     """
     move: FloatArray = np.asarray(np.linalg.solve(normal, slope), dtype=np.float64)
     free = np.ones(move.size, dtype=np.bool_)

@@ -46,6 +46,7 @@ class Ticker:
     steps : Steps
     delay : float
         From a command to its effect, where all are applied as they come [s].
+
     """
 
     recording: str
@@ -82,6 +83,7 @@ def at_ticks(commands: TimeSeries, period: float, phase: float) -> TimeSeries:
     -------
     TimeSeries
         At the next tick each; of several between two ticks the last one.
+
     """
     number = np.ceil((commands.times - phase) / period)
     last = np.append(np.diff(number) > 0.5, True)
@@ -104,6 +106,7 @@ def usual_period(series: Sequence[FloatArray]) -> float:
     -------
     float
         [s].
+
     """
     usual = float(np.median(np.concatenate([np.diff(times) for times in series])))
     along = across = 0.0
@@ -181,6 +184,7 @@ class ClockSearch:
     tickers : sequence of Ticker
         One a drive.
     pool : Threads
+
     """
 
     tickers: Sequence[Ticker]
@@ -309,6 +313,7 @@ def gain_by_chance(lengths: Sequence[float]) -> float:
     -------
     float
         [nats].
+
     """
     band = 1.0 / setting('clock_shortest') - 1.0 / setting('clock_longest')
     return (math.log(max(max(lengths) * band, 1.0)) - len(lengths) * math.log(

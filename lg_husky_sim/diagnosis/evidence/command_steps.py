@@ -45,6 +45,7 @@ class Steps:
         How much of each delay comes from the readings, and not from the prior (0 to 1).
     scales : list of float
         One over the standard deviation of the residuals of each rate.
+
     """
 
     stamps: FloatArray
@@ -80,6 +81,7 @@ class Steps:
         Returns
         -------
         ClockCosts
+
         """
         one = np.ones(self.stamps.size)
         whole = self.curvature @ one
@@ -103,6 +105,7 @@ class ClockCosts:
         At the likeliest lateness, and that [s].
     stiffness : float
         K [1/s^2].
+
     """
 
     cost: FloatArray
@@ -165,6 +168,7 @@ def steps_of(commands: TimeSeries, span: tuple[float, float],
     -------
     Steps or None
         None where no rate or no step of a command is known, or none shows in a rate.
+
     """
     moved = np.flatnonzero(np.any(np.diff(commands.values, axis=0) != 0.0, axis=1)) + 1
     moved = moved[(commands.times[moved] > span[0]) & (commands.times[moved] < span[1])]

@@ -57,6 +57,7 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: flo
     -------
     numpy.ndarray, shape (28,)
         In the order of :data:`whitener.MODEL`.
+
     """
     one, states = plant.sets[0], plant.states
     n = len(states)

@@ -35,6 +35,7 @@ class Differences:
     drives : sequence of Drive
     pool : concurrent.futures.Executor
         Threads for the independent simulations.
+
     """
 
     predict: Callable[[Point], tuple[FloatArray, ...]]
@@ -53,6 +54,7 @@ class Differences:
             Readings of each drive there.
         which : sequence of int
             Places of its unknowns.
+
         """
         names = {u.name: k for k, u in enumerate(point.unknowns) if u.kind == 'log'}
         acting = self._lags(names)

@@ -35,6 +35,7 @@ def dispersion(evidence: Evidence, whitened: FloatArray, columns: FloatArray) ->
     -------
     float
         At least what Student's t makes of white innovations.
+
     """
     scores = whitened * student.weights(whitened)
     sums = np.array([scores[part] @ columns[part] for part in _blocks(evidence, setting('block'))])
@@ -60,6 +61,7 @@ def accident(evidence: Evidence, before: FloatArray, after: FloatArray) -> float
     -------
     float
         [nats]
+
     """
     gains = student.costs(before) - student.costs(after)
     return max(0.0, *(float(np.sum(gains[part])) for part in _blocks(

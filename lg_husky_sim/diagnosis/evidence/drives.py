@@ -50,6 +50,7 @@ class Clock:
     ----------
     period, phase, late : float
         [s]
+
     """
 
     period: float
@@ -106,6 +107,7 @@ class Drive:
         place [s]; empty where none did.
     memory : Memory
         What was worked out about this drive.
+
     """
 
     recording: str
@@ -178,6 +180,7 @@ def smoothed(times: FloatArray, values: FloatArray, width: float) -> FloatArray:
     Returns
     -------
     numpy.ndarray, shape (n,)
+
     """
     n = times.size
     if n < 4:
@@ -242,6 +245,7 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
     -------
     Drive or None
         None where it has no command, nothing measured, or is too short.
+
     """
     streams = segment.streams
     if 'command' not in streams or segment.duration < setting('shortest_segment'):
@@ -357,6 +361,7 @@ def drives_of(recordings: Sequence[Recording]) -> tuple[Drive, ...]:
     ------
     RecordingError
         If one has no commands, or nothing that can be compared with a simulation.
+
     """
     found = []
     for recording in recordings:

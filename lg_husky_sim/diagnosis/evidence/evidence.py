@@ -60,6 +60,7 @@ class Fit:
         The same of each drive, not whitened.
     predicted : tuple of numpy.ndarray
         Simulated readings of each drive.
+
     """
 
     point: Point
@@ -84,6 +85,7 @@ class Evidence:
         One a drive.
     pool : Threads
         For independent simulations.
+
     """
 
     def __init__(self, drives: Sequence[Drive], names: Sequence[str], noise: Noise,
@@ -170,6 +172,7 @@ class Evidence:
         Returns
         -------
         Fit
+
         """
         point = start
         predicted = self.predict(point)
@@ -237,6 +240,7 @@ class Evidence:
         Returns
         -------
         Evidence
+
         """
         plants = self.plants(fit.point.plant)
         drives = self._repaired(fit, plants)

@@ -34,6 +34,7 @@ class Frame:
     kicks : numpy.ndarray, shape (n_kicks, 6)
         Times of commands [s], variances of the wheels' rates where one seems lost [(rad/s)²],
         steps of the voltages [V], and how far from its time a step may come [s].
+
     """
 
     drive: Drive
@@ -61,6 +62,7 @@ def frame_of(drive: Drive, plant: Plant, motion: Motion, predicted: FloatArray,
     reading : Reading
     reach : float
         How much earlier or later than on the mean a command may come [s].
+
     """
     times = np.array(drive.times)
     lag = wheel_lag(reading, drive.wheel_period)

@@ -63,6 +63,7 @@ def low_passed(times: FloatArray, rates: FloatArray, turned: FloatArray, lag: fl
     -------
     numpy.ndarray, shape (n,)
         [rad/s]
+
     """
     out = np.empty(times.size)
     _follow(np.ascontiguousarray(times), np.ascontiguousarray(rates),
@@ -84,6 +85,7 @@ def followed_by_message(values: FloatArray, share: float) -> FloatArray:
     Returns
     -------
     numpy.ndarray, shape (n,)
+
     """
     if share <= 0.0 or not values.size:
         return values

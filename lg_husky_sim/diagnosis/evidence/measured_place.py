@@ -42,6 +42,7 @@ def acts_at(drive: Drive, onset: Onset, times: FloatArray, delay: float
     Returns
     -------
     numpy.ndarray of bool, shape (n,)
+
     """
     x = drive.measured[drive.slice_of(Channel.X)]
     return acts(onset, times, np.interp(times, drive.pose_times - delay, x))
@@ -60,6 +61,7 @@ def legs_of(drive: Drive, onset: Onset, delay: float) -> list[tuple[float, bool]
     -------
     list of (float, bool)
         End of each leg [s], the last one without end, and whether they act in it.
+
     """
     times = drive.pose_times - delay
     x = drive.measured[drive.slice_of(Channel.X)]

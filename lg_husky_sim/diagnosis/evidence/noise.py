@@ -52,6 +52,7 @@ class Noise:
         of place [m/sqrt(s)] and heading [rad/sqrt(s)], sensors: wheel [rad/s or rad], gyro
         [rad/s], place [m], heading [rad], and jitter of the stamps of each stream and of
         commands [s].
+
     """
 
     values: Mapping[str, float]
@@ -99,6 +100,7 @@ class Whitener:
     model, process : numpy.ndarray
     gain, scale : numpy.ndarray
         As in :func:`whitener.gains`.
+
     """
 
     frame: Frame
@@ -120,6 +122,7 @@ class Whitener:
         -------
         numpy.ndarray, the same shape
             Innovations over their standard deviations, in the order of time.
+
         """
         columns = np.ascontiguousarray(residuals.reshape(residuals.shape[0], -1))
         out = np.empty_like(columns)
@@ -144,6 +147,7 @@ class Whitener:
         Returns
         -------
         numpy.ndarray, shape (n, m)
+
         """
         out = np.empty(on.shape)
         frame = self.frame
@@ -184,6 +188,7 @@ def negative_log_likelihood(whitened: FloatArray, scale: FloatArray) -> float:
     Parameters
     ----------
     whitened, scale : numpy.ndarray, shape (n,)
+
     """
     return student.cost(whitened) + float(np.sum(np.log(scale)))
 
@@ -250,6 +255,7 @@ def fit_noise(start: Noise, frames: Sequence[Frame], models: Sequence[FloatArray
     Returns
     -------
     Noise
+
     """
     centre, spread, lower, upper = _bounds(longest, robot)
     step = 0.05

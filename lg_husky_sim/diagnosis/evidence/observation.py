@@ -64,6 +64,7 @@ class Wanted:
         ``probe``.
     spans : numpy.ndarray, shape (n_wheels,)
         Lengths of the windows [s].
+
     """
 
     events: Events
@@ -89,6 +90,7 @@ class Motion:
     drive : Drive
     delay : float
         How late the stamps of its pose are [s].
+
     """
 
     times: FloatArray
@@ -204,6 +206,7 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
     -------
     Motion
         Read at the stamps of the sensors less what the first set of the plant is late.
+
     """
     sensors = plant.sets[-1].sensors
     delays = (sensors.delay_wheels + reading.get('delay_wheels'),
@@ -325,6 +328,7 @@ def observe(motion: Motion, drive: Drive, reading: Reading) -> FloatArray:
     -------
     numpy.ndarray, shape (n,)
         In the order of ``drive.measured``.
+
     """
     sets = motion.plant.sets
     if len(sets) == 1 or sets[0].sensors == sets[1].sensors:

@@ -32,6 +32,7 @@ class Point:
         Of the model and of its effects; the unknowns' values replace theirs.
     reading : Reading
         How the log was made.
+
     """
 
     structure: Structure

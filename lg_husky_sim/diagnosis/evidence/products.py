@@ -27,6 +27,7 @@ def normal_matrix(columns: FloatArray, weights: FloatArray) -> FloatArray:
     Returns
     -------
     numpy.ndarray, shape (m, m)
+
     """
     normal = np.zeros((columns.shape[1], columns.shape[1]))
     for some in row_slices(len(columns)):

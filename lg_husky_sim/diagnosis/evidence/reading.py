@@ -44,6 +44,7 @@ class Reading:
         ``gyro_offset`` [rad/s],
         ``gyro_gain`` [1] (relative), ``pose_turn`` [rad] (heading of the pose's frame against the
         direction of travel), ``pose_lever`` [m] (how far ahead of the middle it is).
+
     """
 
     wheels: WheelReading = WheelReading.WINDOW_END

@@ -41,6 +41,7 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
     -------
     TimeSeries
         The same object where none is repaired.
+
     """
     stamps = logged.times
     if stamps.size <= 3:

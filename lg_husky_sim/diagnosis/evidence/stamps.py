@@ -43,6 +43,7 @@ def evened(times: FloatArray) -> FloatArray:
     -------
     numpy.ndarray, shape (n,)
         As they are where they do not tell which of an even series each is, or are even enough.
+
     """
     if times.size < int(setting('stamps_even')):
         return times
@@ -104,6 +105,7 @@ def likeliest_stamps(evidence: Evidence, fit: Fit) -> tuple[Evidence, Point]:
         The same noise; the given one where no stream is read more evenly than it is stamped.
     Point
         Of the fit, with the delays of these streams.
+
     """
     best, point = evidence, fit.point
     for stream, (delay, _) in STREAMS.items():

@@ -29,6 +29,7 @@ def costs(whitened: FloatArray) -> FloatArray:
     -------
     numpy.ndarray
         Of the same shape [nats].
+
     """
     nu = setting('student')
     each: FloatArray = 0.5 * (nu + 1.0) * np.log1p(whitened * whitened / nu)

@@ -44,6 +44,7 @@ class Unknown:
     prompt, own, room : float
         Of a delay: its centre, its deviation, and how far its bounds are from the centre, if no
         stamp jitters [s].
+
     """
 
     name: str
@@ -98,6 +99,7 @@ def delay_unknown(name: str, centre: float, deviation: float, period: float) -> 
     Returns
     -------
     Unknown
+
     """
     own = math.hypot(deviation, period / math.sqrt(12.0))
     room = 0.5 * period + setting('log_reach') * deviation
@@ -145,6 +147,7 @@ def base_unknowns(parameters: Parameters, drives: Sequence[Drive]) -> tuple[Unkn
     Returns
     -------
     tuple of Unknown
+
     """
     found = [model_unknown(parameters.entry(name)) for name in RECALIBRATED
              if name in parameters and parameters.entry(name).tolerance > 0.0]
@@ -208,6 +211,7 @@ def loosened(unknowns: Sequence[Unknown], jitter: Mapping[str, float]) -> tuple[
     Returns
     -------
     tuple of Unknown
+
     """
     found = []
     for one in unknowns:

@@ -3,10 +3,9 @@
 """
 Whiten residuals of an open-loop simulation: innovations of the deviation model.
 
-What nobody can predict enters at the balances of the graph: a force on the chassis, a moment on
-it and a torque on the wheels of each side, each first-order coloured. With the slow states of the
-linear model (forward speed v, yaw rate w; the wheels follow quasi-statically) their deviation z
-from a simulation is::
+What nobody can predict enters at the graph's balances: force and moment on the chassis and torque
+on the wheels of each side, each first-order coloured. With the linear model's slow states (forward
+speed v, yaw rate w; wheels follow quasi-statically) their deviation z from a simulation is::
 
     d_i' = -d_i / tau_i + noise                       force, moment, torque left, torque right
     (v, w)' = A_s (v, w) + E_s d,     bias' = noise
@@ -184,10 +183,9 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
         by so much more [(N·m)²], and steps of the voltages there [V]: a step that comes by s
         later leaves s times what the voltages accelerate and how fast they turn the wheels. Last
         how far from its time a step may come [s]: readings in this time tell nothing of it.
-    gain : numpy.ndarray, shape (n, 12)
-        Receives the gains, in the order of time.
-    scale : numpy.ndarray, shape (n,)
-        Receives the standard deviations of the innovations, in the order of time.
+    gain, scale : numpy.ndarray, shapes (n, 12), (n,)
+        Receive the gains and the standard deviations of the innovations, in the order of time.
+
     """
     p = np.zeros((12, 12))
     for i in range(12):
@@ -294,6 +292,7 @@ def whiten(residuals: FloatArray, times: FloatArray, channels: Integers, order: 
         As in :func:`gains`.
     out : numpy.ndarray, shape (n, m)
         Receives the whitened innovations, in the order of time.
+
     """
     count = residuals.shape[1]
     width = _width(count)
@@ -326,6 +325,7 @@ def respond(efforts: FloatArray, grid: FloatArray, times: FloatArray, channels: 
         As in :func:`gains`.
     out : numpy.ndarray, shape (n, m)
         Receives the deviations, in the order of the readings.
+
     """
     count = efforts.shape[2]
     z = np.zeros((12, count))
@@ -369,14 +369,14 @@ def whiten_switched(change: FloatArray, states: FloatArray, on: NDArray[np.uint8
     ----------
     change : numpy.ndarray, shape (n,)
         Of the readings, when it acts always.
-    states : numpy.ndarray, shape (n, 12)
-        The deviation that it has built up at each reading, in the order of time.
-    on : numpy.ndarray of uint8, shape (n, m)
-        Whether it acts at each reading, in the order of time; m patterns.
+    states, on : numpy.ndarray, shapes (n, 12), (n, m); on of uint8
+        In the order of time: the deviation that it has built up at each reading, and whether it
+        acts there; m patterns.
     times, channels, order, cosine, sine, model, process, longest, gain, scale
         As in :func:`whiten`.
     out : numpy.ndarray, shape (n, m)
         Receives the whitened innovations, in the order of time.
+
     """
     count = on.shape[1]
     width = _width(count)

@@ -35,6 +35,7 @@ def levelled(scores: FloatArray, speeds: FloatArray) -> FloatArray:
     -------
     numpy.ndarray, shape (n,)
         Of a mean square of one in each of some groups of like speed.
+
     """
     found = np.array(scores)
     count = max(1, min(int(setting('burst_speeds')), scores.size // int(setting('burst_least'))))
@@ -58,6 +59,7 @@ def burst_evidence(scores: FloatArray) -> float:
     -------
     float
         [nats]
+
     """
     strongest = int(np.argmax(np.abs(scores))) if scores.size else 0
     reach = int(setting('burst_reach'))

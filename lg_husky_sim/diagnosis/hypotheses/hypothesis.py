@@ -30,6 +30,7 @@ class Hypothesis:
     starts : tuple of mapping
         Values of its free parameters.
     onset : Onset or None
+
     """
 
     effect: Effect
@@ -104,6 +105,7 @@ class Hypothesis:
         list of list of mapping
             Groups; the columns of a group are looked at together. Numbers that do something by
             themselves get a column each.
+
         """
         known = [neutral_of(p) for p in self.free]
         neutral = {p.name: v for p, v in zip(self.free, known, strict=True) if v is not None}
@@ -164,6 +166,7 @@ def hypotheses(structure: Structure) -> tuple[Hypothesis, ...]:
         Without effects that it has, without those that share a number with one it has, and
         without those of the catalogue that a diagnosis does not try, and without forms that
         another one stands for.
+
     """
     taken = {p.name for e in structure.effects for p in e.parameters()}
     found = []
@@ -198,6 +201,7 @@ def with_effects(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Poin
     Returns
     -------
     Point
+
     """
     own = {unknown.name for unknown in plain.unknowns}
     base = [place for place, unknown in enumerate(final.unknowns)

@@ -53,6 +53,7 @@ class Line(Effort):
     ----------
     period : float
         Of the quantity [rad of the wheels' angle, m, V].
+
     """
 
     period: float
@@ -85,6 +86,7 @@ def periodogram(values: FloatArray, quantity: FloatArray, step: float, count: in
     Returns
     -------
     numpy.ndarray, shape (count,)
+
     """
     turn = np.exp(2j * np.pi * step * quantity)
     now = np.ones_like(turn)
@@ -108,6 +110,7 @@ def chance_of_lines(spectra: Sequence[FloatArray]) -> FloatArray:
     -------
     numpy.ndarray, shape (n,)
         Natural logarithm of the probability.
+
     """
     reach, gap = (DENSITY * int(setting(name)) for name in ('line_reach', 'line_gap'))
     total = np.zeros(spectra[0].size)
@@ -137,6 +140,7 @@ def level(spectrum: FloatArray, reach: int, gap: int) -> FloatArray:
         ``exp(a + b log f + gamma)`` at f, with the least-squares line a + b log f through the
         logarithms of the neighbours and Euler's constant gamma, by which the mean logarithm of an
         exponential variable is below that of its mean. A line among them hardly moves it.
+
     """
     logs = np.log(np.maximum(spectrum, 1e-300))
     x = np.log(np.arange(1.0, spectrum.size + 1.0))
@@ -168,6 +172,7 @@ def lines(evidence: Evidence, fit: Fit) -> tuple[Line, ...]:
     tuple of Line
         The best period of each of :data:`LOOKS` that drives are long enough for, where it has any
         evidence; largest first.
+
     """
     projection = Projection(fit)
     motions, units = evidence.motions(fit.point, True), _units(fit)

@@ -51,6 +51,7 @@ def responses(signal: FloatArray, times: FloatArray, argument: str, count: int) 
     -------
     numpy.ndarray, shape (n, count)
         [unit of the signal, of a sign '1'] times seconds.
+
     """
     if PAST[argument][1]:
         signal = np.clip(signal / setting('still_speed'), -1.0, 1.0)

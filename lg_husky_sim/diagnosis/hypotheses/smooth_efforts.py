@@ -83,6 +83,7 @@ class Effort:
         second of its signal does.
     largest : float
         Largest size in these drives [unit of the balance].
+
     """
 
     balance: str
@@ -157,6 +158,7 @@ def log_evidence(normal: FloatArray, slope: FloatArray) -> tuple[float, FloatArr
         Coefficients.
     numpy.ndarray, shape (k,)
         Their standard deviations.
+
     """
     values, vectors = np.linalg.eigh(normal)
     values = np.maximum(values, 0.0)
@@ -197,6 +199,7 @@ def beyond_chance(evidence: Evidence, fit: Fit, projection: Projection, columns:
         As if they were white [nats].
     numpy.ndarray, numpy.ndarray
         Coefficients and their standard deviations, as of :func:`log_evidence`.
+
     """
     normal, slope = projection.problem(columns)
     explained, values, deviations = log_evidence(normal, slope)
@@ -221,6 +224,7 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     -------
     tuple of Effort
         Largest evidence first.
+
     """
     motions = evidence.motions(fit.point, True)
     known = quantities(evidence, motions)
@@ -280,6 +284,7 @@ def moved_by(whitener: Whitener, row: int, shape: FloatArray) -> FloatArray:
     Returns
     -------
     numpy.ndarray, shape (n, k)
+
     """
     frame, drive = whitener.frame, whitener.frame.drive
     pushed = np.zeros((shape.shape[0], 4, shape.shape[1]))

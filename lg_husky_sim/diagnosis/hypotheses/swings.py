@@ -46,6 +46,7 @@ class Swing(Effort):
     ----------
     period : float
         [s]
+
     """
 
     period: float
@@ -66,6 +67,7 @@ def swinging(times: FloatArray, heading: FloatArray, frequency: float) -> FloatA
     -------
     numpy.ndarray, shape (n, 4)
         To be multiplied with a, b, c and d.
+
     """
     phase = 2.0 * np.pi * frequency * times
     return np.column_stack([swing * way for way in (np.cos(heading), np.sin(heading))
@@ -85,6 +87,7 @@ def swings(evidence: Evidence, fit: Fit) -> tuple[Swing, ...]:
     -------
     tuple of Swing
         Of the likeliest period; none without any evidence.
+
     """
     known = quantities(evidence, evidence.motions(fit.point, True))
     projection = Projection(fit)

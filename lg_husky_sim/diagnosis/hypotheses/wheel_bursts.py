@@ -43,6 +43,7 @@ def wheel_bursts(evidence: Evidence, fit: Fit, side: str) -> float:
     -------
     float
         [nats], at least 0, without the strongest one: what happens once is an accident.
+
     """
     gains: list[float] = []
     readings, top = 0, 0

@@ -49,6 +49,7 @@ def best_reading(evidence: Evidence, fit: Fit, afresh: bool = False) -> Fit:
     -------
     Fit
         With that reading, under the same noise; the given one where none is better.
+
     """
     chosen = _better(evidence, fit, _wheel_options, afresh)
     return _better(evidence, chosen, _imu_options)
@@ -124,6 +125,7 @@ def as_late(evidence: Evidence, point: Point, name: str, more: float) -> list[Po
     list of Point
         One for each place of the stamps in the windows of the rates, as long as they are, where
         the stamps need not be off by more than they may be.
+
     """
     now, period, wheels = point.log, _imu_period(evidence), _wheel_period(evidence)
     lag_of: Callable[[Reading], float] = {
@@ -154,6 +156,7 @@ def read_like(point: Point, other: Point) -> Point:
         With the robot's numbers and effects.
     other : Point
         With its reading, and how long its windows are.
+
     """
     known = {u.name: place for u, place in zip(other.unknowns, other.places, strict=True)
              if u.name in _WINDOWS}

@@ -36,6 +36,7 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
     Fit
         With those that are kept.
     list of Hypothesis
+
     """
     kept = list(found)
     every = sum(len(one.trials()) for one in hypotheses(plain.structure))

@@ -53,6 +53,7 @@ def exchanged(evidence: Evidence, plain: Point, final: Fit, rounds: Sequence[Rou
     list of Round
     list of Hypothesis
         Both in the same order.
+
     """
     kept, told = list(found), list(rounds)
     for place, one in enumerate(found):

@@ -53,6 +53,7 @@ class Laws:
         The model without effects.
     found : sequence of Hypothesis
         In the order of adoption; their numbers come last.
+
     """
 
     plain: Point
@@ -74,6 +75,7 @@ class Laws:
         -------
         list of float
             From 0 to 1.
+
         """
         exact = [h for h in self.found if h.effect.kind.subsystem is Subsystem.SENSOR]
         if len(exact) == len(self.found) or not others:

@@ -36,6 +36,7 @@ def narrowed(evidence: Evidence, hypothesis: Hypothesis, point: Point) -> Number
     -------
     mapping of str to float, or None
         None for effects of several numbers, or with fewer starts than tell a maximum.
+
     """
     name = hypothesis.free[0].name
     values = sorted({start[name] for start in hypothesis.starts})

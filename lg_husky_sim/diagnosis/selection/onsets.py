@@ -74,6 +74,7 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     -------
     list of Look
         The best onset of each.
+
     """
     if base.point.structure.onset is not None:
         return []
@@ -119,6 +120,7 @@ class _Patterns:
         Whether it acts at each reading, in the order of time.
     place : numpy.ndarray of int, shape (m,)
         Which of the k columns each onset has.
+
     """
 
     different: NDArray[np.uint8]
@@ -227,6 +229,7 @@ def refined(evidence: Evidence, base: Fit, tried: Any, attempt: Callable[..., An
     Returns
     -------
     Tried
+
     """
     onset = tried.hypothesis.onset
     is_time = onset.kind is OnsetKind.TIME

@@ -34,6 +34,7 @@ def reached_of(evidence: Evidence, fit: Fit) -> Mapping[str, FloatArray]:
         By the quantities that parameters of ``effects.yaml`` limit: voltage [V] and current [A]
         of a motor, commanded speed [m/s] and yaw rate [rad/s]; n shares from
         ``reached_least`` to ``reached_most``.
+
     """
     pooled: dict[str, list[FloatArray]] = {}
     for drive, motion in zip(evidence.drives, evidence.motions(fit.point, True), strict=True):
@@ -65,6 +66,7 @@ def limits_reached(hypothesis: Hypothesis, reached: Mapping[str, FloatArray]
     -------
     list of list of mapping
         Empty for an effect that limits nothing.
+
     """
     free = hypothesis.free
     if not all(p.limits in reached for p in free):

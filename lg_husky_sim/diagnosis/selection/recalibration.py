@@ -34,6 +34,7 @@ class Logged:
         The effects that promise more, best first.
     early : sequence of Tried
         All that were fitted under the usual reading, best first.
+
     """
 
     fit: Fit
@@ -81,6 +82,7 @@ class Recalibrated:
         With the last noise.
     base : Fit
         Under that.
+
     """
 
     first: Evidence
@@ -121,6 +123,7 @@ def at_ticks(known: Recalibrated, start: Point, rivals: Sequence[Sequence[Drive]
     Recalibrated or None
         None where ticks are not likelier, or the robot's numbers are distorted with them, too: it
         lacks something else then, which the ticks may be a part of.
+
     """
     # From where delays have not taken their place, of a log that was made as most are or like that
     # without ticks: a low pass is not to be held against them.

@@ -43,6 +43,7 @@ class Tried:
     fit : Fit
     gain : float
         What it lowers the cost of the base by, under one noise [nats].
+
     """
 
     hypothesis: Hypothesis
@@ -72,6 +73,7 @@ class Round:
     adopted : bool
     chance : float
         Probability of such a gain on a robot that lacks nothing.
+
     """
 
     evidence: Evidence
@@ -99,6 +101,7 @@ def calibrated(evidence: Evidence, start: Point, times: int = 2) -> tuple[Eviden
         With the noise of the fit.
     Fit
         Under that noise.
+
     """
     fit = evidence.fit(start)
     for _ in range(times):
@@ -142,6 +145,7 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
     -------
     Tried or None
         None where it cannot be simulated.
+
     """
     starts: dict[bytes, tuple[float, Point]] = {}
     for point, numbers in begins:
@@ -200,6 +204,7 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     Returns
     -------
     Round
+
     """
     seen = _looks(evidence, base, pool, None if nominal is not None else ())
     few = int(setting('fitted'))
@@ -337,6 +342,7 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     Returns
     -------
     list of Tried
+
     """
     least = max(setting('least_look'), setting('look_part') * max(
         (one.gain for one in looks if one.gain < math.inf), default=0.0))

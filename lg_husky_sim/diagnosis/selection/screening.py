@@ -53,6 +53,7 @@ class Look:
     gain : float
         Linear estimate of what it lowers the cost by [nats]; infinite for one that is fitted
         whatever it promises.
+
     """
 
     hypothesis: Hypothesis
@@ -68,6 +69,7 @@ class Projection:
     ----------
     fit : Fit
         Of the base.
+
     """
 
     def __init__(self, fit: Fit) -> None:
@@ -100,6 +102,7 @@ class Projection:
         -------
         normal : numpy.ndarray, shape (m, m)
         slope : numpy.ndarray, shape (m,)
+
         """
         explained = self._base @ columns
         return (normal_matrix(columns, self._weights) - explained.T @ explained,
@@ -127,6 +130,7 @@ class Projection:
         -------
         tuple of numpy.ndarray, shapes (k, size, m), (size, m), (size, size, m)
             They add up over the readings.
+
         """
         count, size, sets = columns.shape
         explained = np.zeros((len(self._base), size * sets))
@@ -157,6 +161,7 @@ def problems_of(products: Products) -> tuple[FloatArray, FloatArray]:
     -------
     normal : numpy.ndarray, shape (m, size, size)
     slope : numpy.ndarray, shape (m, size)
+
     """
     explained, slope, products_of_two = products
     normal = np.array(products_of_two)
@@ -178,6 +183,7 @@ def gain_of(normal: FloatArray, slope: FloatArray, limits: Sequence[tuple[float,
     slope : numpy.ndarray, shape (m,)
     limits : sequence of (float, float)
         Of each coefficient, see :func:`limits_of`.
+
     """
     size = np.sqrt(np.maximum(np.diag(normal), 0.0))
     if not np.all(np.isfinite(size)) or np.any(size <= setting('rounding')):
@@ -215,6 +221,7 @@ def settled(whitened: FloatArray, columns: FloatArray, start: FloatArray,
     float
         [nats]
     numpy.ndarray, shape (m,)
+
     """
     low, high = np.transpose(limits)
     before, gain, best = student.cost(whitened), 0.0, start
@@ -250,6 +257,7 @@ def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]
     -------
     list of Look
         The best start of each, in the order of the linear gain.
+
     """
     projection = Projection(fit)
     reached = reached_of(evidence, fit)
@@ -352,6 +360,7 @@ def limits_of(hypothesis: Hypothesis, group: Sequence[Numbers]) -> list[tuple[fl
     list of (float, float)
         Any that the bounds of a number allow, where it acts in proportion; others stay near the
         size that was simulated.
+
     """
     near = (setting('least_factor'), setting('most_factor'))
     flags = in_proportion(hypothesis, group)

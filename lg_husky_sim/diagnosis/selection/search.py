@@ -63,6 +63,7 @@ class Search:
     rounds : tuple of Round
     found : tuple of Hypothesis
         Adopted, in the order of adoption.
+
     """
 
     plain: Fit
@@ -106,6 +107,7 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tri
     list of Tried
         The effect that gains most from there, with numbers, noise and reading of its own; none
         where none promised more than a reading and the recalibration has a small prior penalty.
+
     """
     names = [u.name for u in base.point.unknowns]
     found = []
@@ -157,6 +159,7 @@ def read_anew(evidence: Evidence, base: Fit, early: Sequence[Tried]
     -------
     tuple of (Evidence, Hypothesis, Point) or None
         None where there are no effects.
+
     """
     read = [(best_reading(evidence, one.fit), one.hypothesis) for one in early]
     if not read:
@@ -227,6 +230,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     Returns
     -------
     Search
+
     """
     progress('recalibration', 0.05)
     known = recalibrated(evidence, start)

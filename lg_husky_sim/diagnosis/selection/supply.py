@@ -42,6 +42,7 @@ def likeliest_supply(drives: Sequence[Drive], names: Sequence[str], start: Point
     numbers : Parameters
         The same object where no command asks for more than the supply, or none is likelier by
         more than the best of those that are tried would be by chance.
+
     """
     command, known = start.plant.sets[0].command, start.parameters
     if command.clamp <= 0.0:

@@ -53,6 +53,7 @@ def likelier_ticks(first: Evidence, plain: tuple[Evidence, Fit], starts: Sequenc
         Where the fits begin.
     rivals : sequence of sequence of Drive
         With commands at ticks of one rate or another.
+
     """
     afresh = [(evidence, evidence.fit(point)) for evidence, point in (
         ticked(first, start, drives) for drives in rivals for start in starts)]
@@ -73,6 +74,7 @@ def ticks_are_likelier(plain: tuple[Evidence, Fit], ticked: tuple[Evidence, Fit]
         Without and with them.
     drives : sequence of Drive
         With the ticks that are likeliest.
+
     """
     before, after = (evidence.surprise(fit) for evidence, fit in (
         calibrated(evidence, any_lateness(fit.point), 1) for evidence, fit in (plain, ticked)))

@@ -40,6 +40,7 @@ def is_near(evidence: Evidence, best: Fit, other: Fit, difference: float, gain: 
     Returns
     -------
     bool
+
     """
     if difference < setting('near_margin') * gain:
         return True

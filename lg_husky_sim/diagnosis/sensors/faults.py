@@ -43,6 +43,7 @@ class Fault:
     certainty : float
         How many standard deviations it is beyond its tolerance.
     statement : str
+
     """
 
     effect: Effect | None
@@ -80,6 +81,7 @@ def unit_of(ratio: float) -> str | None:
     -------
     str or None
         None where it is near none.
+
     """
     for name, size in _table()['units'].items():
         if abs(abs(ratio) / float(size) - 1.0) < setting('other_radius'):
@@ -99,6 +101,7 @@ def faults(found: Sequence[Relation]) -> tuple[Fault, ...]:
     -------
     tuple of Fault
         Most serious first: a wrong sign, then late stamps, factors and offsets.
+
     """
     every = by_names(found)
     known = {key: one for key, one in every.items()

@@ -45,6 +45,7 @@ class ChannelFit:
         where there is no such part.
     reached : float
         Largest measured rate but for outliers [unit of the channel].
+
     """
 
     gain: Number
@@ -73,6 +74,7 @@ class WheelFit:
         Of the side that is explained less.
     interval : float
         Usual interval of the samples [s].
+
     """
 
     left: Number
@@ -96,6 +98,7 @@ def body_fits(parts: Predicted) -> Mapping[str, ChannelFit]:
     mapping of str to ChannelFit
         By ``forward`` (of the pose), ``yaw_rate`` (gyro) and ``turn`` (heading of the pose);
         those that were recorded, moved enough and for long enough.
+
     """
     found = {}
     for name, measure, column, least in (
@@ -151,6 +154,7 @@ def wheel_fits(parts: Predicted) -> WheelFit | None:
     -------
     WheelFit or None
         None without wheels, or where they turn too little.
+
     """
     pairs: tuple[list[Pair], list[Pair]] = ([], [])
     for part, series in parts:

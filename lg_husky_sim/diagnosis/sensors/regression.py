@@ -62,6 +62,7 @@ class Regression:
         Longest usual interval of the signals [s].
     seconds : float
         That were compared.
+
     """
 
     factors: tuple[Number, ...]
@@ -90,6 +91,7 @@ def regression(pairs: Sequence[Pair], least: Sequence[float], *, offset: bool
     -------
     Regression or None
         None where they do not run together, or move, for long enough.
+
     """
     reach, span = setting('latest'), setting('relation_window')
     used, intervals = [], []

@@ -57,6 +57,7 @@ class Relation:
         Longest of the two streams' usual intervals [s].
     seconds : float
         That were compared.
+
     """
 
     quantity: str
@@ -93,6 +94,7 @@ def relations(parts: Sequence[Segment]) -> tuple[Relation, ...]:
     -------
     tuple of Relation
         Of the streams that were recorded, moved enough and together for long enough.
+
     """
     found = []
     for quantity, source, reference, own, other in _PAIRS:

@@ -42,6 +42,7 @@ def certain(found: Sequence[Fault]) -> tuple[Fault, ...]:
     tuple of Fault
         All that the catalogue has if a sign or a stamp is wrong; none otherwise, since factors
         and offsets are in no one's way.
+
     """
     named = [f for f in found if f.effect is not None and f.number is not None]
     gross = any(f.number is not None and (
@@ -64,6 +65,7 @@ def begun_with(start: Point, found: Sequence[Fault]) -> tuple[Point, tuple[Fault
     Point
     tuple of Fault
         Those that it has: a model holds no two of one kind.
+
     """
     put = []
     for fault in found:
@@ -104,6 +106,7 @@ def fault_findings(found: Sequence[Fault], fit: Fit | None = None) -> tuple[Find
     Returns
     -------
     tuple of Finding
+
     """
     gains = [0.5 * f.certainty ** 2 for f in found]
     total = sum(gains) or 1.0

@@ -33,6 +33,7 @@ class Difference:
     comparable : bool
         Whether another base may be fitted to it: its wheels move it, and its streams are of one
         robot.
+
     """
 
     subsystem: str
@@ -57,6 +58,7 @@ def differences(found: Sequence[Relation], parameters: Parameters) -> tuple[Diff
     Returns
     -------
     tuple of Difference
+
     """
     known = by_names(found)
     speed = known.get(('speed', 'wheels', 'pose'))
@@ -120,6 +122,7 @@ def impossible(fit: Fit, parameters: Parameters) -> tuple[Difference, ...]:
     -------
     tuple of Difference
         One for all of them, or none.
+
     """
     most = setting('impossible')
     load = fit.point.structure.robot.factor('kg') * setting('largest_load')

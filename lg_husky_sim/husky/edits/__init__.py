@@ -31,6 +31,7 @@ def edits() -> Mapping[str, Edit]:
     ------
     ParameterError
         If two modules have one for the same effect.
+
     """
     found: dict[str, Edit] = {}
     for module in pkgutil.iter_modules(__path__):
@@ -66,6 +67,7 @@ def edit(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     ------
     ParameterError
         If the effect does not fit the network.
+
     """
     # The numbers of a changed effect have other names; the edit is the same.
     return edits()[effect.id].apply(network, replace(effect, again=False))

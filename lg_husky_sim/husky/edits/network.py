@@ -33,6 +33,7 @@ class LawRow:
         Whether an accelerometer feels the effort; gravity it does not.
     motor : int
         Number of the motor that the source is in series with; 0 for any other law.
+
     """
 
     law: Law
@@ -61,6 +62,7 @@ class EditedNetwork:
         Time constant by which the base smooths its commands; empty where it does not.
     grip : expression
         Factor on the limit of a tyre's force.
+
     """
 
     graph: LinearGraph
@@ -205,6 +207,7 @@ class Edit:
     apply : callable
         Returns the network with the effect in it.
     stage : Stage
+
     """
 
     apply: Callable[[EditedNetwork, Effect], EditedNetwork]
