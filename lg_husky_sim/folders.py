@@ -48,6 +48,7 @@ def check_ours(path: Path, beginning: str) -> None:
     Parameters
     ----------
     path : pathlib.Path
+        File that is to be written.
     beginning : str
         With which every such result begins; '' where none can be there. An empty file may go.
 
@@ -76,6 +77,7 @@ def check_marked(path: Path, mark: str) -> None:
     Parameters
     ----------
     path : pathlib.Path
+        File that is to be written.
     mark : str
         Such as the schema. An empty file may go, too.
 

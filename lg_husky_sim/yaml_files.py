@@ -194,6 +194,7 @@ def parse_yaml(text: str) -> object:
     Parameters
     ----------
     text : str
+        Of a single document.
 
     Returns
     -------
@@ -221,6 +222,7 @@ def read_yaml(path: str | os.PathLike[str], error: type[LgHuskyError]) -> dict[s
     Parameters
     ----------
     path : path-like
+        A text file in UTF-8.
     error : type of LgHuskyError
         What to raise when it cannot be read.
 

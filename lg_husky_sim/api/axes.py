@@ -19,6 +19,7 @@ def axes_or_new(axes: Any, grid: tuple[int, int], what: str, size: tuple[float, 
     Parameters
     ----------
     axes : matplotlib Axes, sequence or array of them, or None
+        Where to draw; None for a new figure.
     grid : tuple of int
         Rows and columns of a new figure; their product is how many axes there must be.
     what : str

@@ -155,6 +155,7 @@ class Comparison:
         figures : int
             Number of recordings, from the first, whose signals and path are drawn as PNG too.
         progress : callable, optional
+            Called with the word ``drawing`` and how far it is (0 to 1).
 
         Returns
         -------

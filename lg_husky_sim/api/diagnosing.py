@@ -58,7 +58,7 @@ class DiagnosisResult:
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """The whole answer as a value."""
+        """Return the whole answer as a value."""
         return self.case.diagnosis
 
     @property
@@ -73,23 +73,23 @@ class DiagnosisResult:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is missing: effect, side, numbers with intervals, a sentence."""
+        """Return what is missing: effect, side, numbers with intervals, a sentence."""
         return self.diagnosis.findings
 
     @property
     def headline(self) -> str:
-        """The answer in one sentence."""
+        """Return the answer in one sentence."""
         from lg_husky_sim.diagnosis.output import headline
         return headline(self.diagnosis, bool(self.baseline))
 
     @property
     def husky(self) -> Husky:
-        """The model recalibrated, with what was found."""
+        """Return the model recalibrated, with what was found."""
         return Husky(self.diagnosis.model)
 
     @property
     def recalibrated(self) -> Husky:
-        """The model recalibrated only."""
+        """Return the model recalibrated only."""
         return Husky(self.diagnosis.plain_model)
 
     def table(self) -> Table:

@@ -33,12 +33,15 @@ def driven(plant: Plant, values: Mapping[str, float], commands: Drive, rate: flo
     Parameters
     ----------
     plant : Plant
+        Robot to drive, with its sensors.
     values : mapping of str to float
         Its parameters: torque_constant and gear_ratio are needed.
     commands : path-like, str, Recording, Manoeuvre, TimeSeries, DataFrame or arrays
+        Recording or manoeuvre to follow, or speeds [m/s] and yaw rates [rad/s] over time [s].
     rate : float, optional
         Samples per second [Hz].
     topics : mapping of str to str, optional
+        Topics of the recording chosen by hand; of a recording only.
 
     Returns
     -------

@@ -68,7 +68,7 @@ class Graph(Responses):
 
     @cached_property
     def symbolic(self) -> SymbolicStateSpace:
-        """The model in symbols, each element's value under the element's own name."""
+        """Return the model in symbols, each element's value under the element's own name."""
         with self._in_file():
             return derive(self.graph, self.outputs, by_element=True)
 
@@ -99,7 +99,7 @@ class Graph(Responses):
 
     @property
     def F(self) -> Any:
-        """Outputs' matrix of du/dt in symbols, a ``sympy.Matrix`` of shape (p, m)."""
+        """Return the outputs' matrix of du/dt in symbols, a ``sympy.Matrix`` of shape (p, m)."""
         return self.symbolic.F
 
     @property
@@ -119,7 +119,7 @@ class Graph(Responses):
 
     @property
     def left_out(self) -> str:
-        """What poles, transfer functions and responses are without; '' for nothing."""
+        """Return what poles, transfer functions and responses are without; '' for nothing."""
         with self._in_file():
             efforts = compile_numeric(self.graph, self.outputs, chained=True).efforts
         names = dict.fromkeys(self._owner(name) for name in efforts)

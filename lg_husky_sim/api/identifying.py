@@ -55,7 +55,7 @@ class Fit:
 
     @property
     def husky(self) -> Husky:
-        """The calibrated model."""
+        """Return the calibrated model."""
         return Husky(self.result.model)
 
     @property
@@ -70,12 +70,12 @@ class Fit:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before the estimates are used: losses, parameters at their bounds."""
+        """Return what to know before estimates are used: losses, parameters at their bounds."""
         return (*[self.result.loss] * bool(self.result.loss), *self.result.warnings)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """What these data cannot determine, in sentences."""
+        """Return what these data cannot determine, in sentences."""
         return self.result.undetermined
 
     @cached_property

@@ -48,13 +48,13 @@ class Responses(ABC):
 
     @property
     def outside(self) -> str:
-        """What not even the graph has; '' for nothing."""
+        """Return what not even the graph has; '' for nothing."""
         return ''
 
     @property
     @abstractmethod
     def left_out(self) -> str:
-        """What the answers are without, such as ``Without T_c: not linear``; '' for nothing."""
+        """Return what the answers are without, as ``Without T_c: not linear``; '' for nothing."""
 
     @abstractmethod
     def numeric(self, **values: float) -> StateSpace:

@@ -99,12 +99,12 @@ class Husky(Graph):
 
     @property
     def left_out(self) -> str:
-        """What poles, transfer functions and responses are without; '' for nothing."""
+        """Return what poles, transfer functions and responses are without; '' for nothing."""
         return '. '.join(filter(None, (super().left_out, self.outside)))
 
     @property
     def outside(self) -> str:
-        """What is not in the graph, as a dead time of the commands; '' for nothing."""
+        """Return what is not in the graph, as a dead time of the commands; '' for nothing."""
         beside = _beside_the_graph(self.model.structure)
         return f'Without {", ".join(beside)}: outside the graph' if beside else ''
 
@@ -113,7 +113,7 @@ class Husky(Graph):
 
     @cached_property
     def plant(self) -> Plant:
-        """The model ready to be stepped."""
+        """Return the model ready to be stepped."""
         return compile_model(self.model.structure).at(self.model.parameters)
 
     @overload
@@ -205,6 +205,7 @@ class Husky(Graph):
         Parameters
         ----------
         recordings : path-like, Recording, or several of them
+            Those to fit to, or the paths of their bags.
         free : iterable of str
             Parameters to estimate; those that the model marks as free, and the numbers of its
             effects, by default.
@@ -256,6 +257,7 @@ class Husky(Graph):
         Parameters
         ----------
         recordings : path-like, Recording, or several of them
+            Those to explain, or the paths of their bags.
         baseline : path-like, Recording, or several of them
             Of the same robot before a change; then the question is what changed.
         jobs : int, optional

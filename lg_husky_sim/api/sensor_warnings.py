@@ -23,6 +23,7 @@ def sensor_warnings(related: Sequence[Relation], model: ModelFile, nuisance: Col
     Parameters
     ----------
     related : sequence of Relation
+        What comparing each stream with the others that see the same motion gave.
     model : ModelFile
         A fault that it has as an effect is none.
     nuisance : collection of str

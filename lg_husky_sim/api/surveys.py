@@ -109,7 +109,7 @@ class Survey:
 
     @property
     def verdict(self) -> str:
-        """What the recording is good for, in one sentence."""
+        """Return what the recording is good for, in one sentence."""
         if self.enough and self.differs:
             return 'No diagnosis is possible with this model, from which the robot differs.'
         if self.enough and not self.warnings:

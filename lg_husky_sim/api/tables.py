@@ -109,9 +109,11 @@ def page_part(title: str, lines: Sequence[str], tables: Sequence[Table],
     Parameters
     ----------
     title : str
+        Heading of the part, as plain text.
     lines : sequence of str
         Paragraphs.
     tables : sequence of Table
+        Below the paragraphs; those without rows are left out.
     points : mapping of str to sequence of str, optional
         Lists by their heading; empty ones are left out.
 

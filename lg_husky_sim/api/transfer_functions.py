@@ -58,18 +58,18 @@ class TransferFunction:
 
     @property
     def gain(self) -> float:
-        """The factor before the product of all (s - zero) over that of all (s - pole)."""
+        """Return the factor before the product of all (s - zero) over that of all (s - pole)."""
         return float(self.numerator[0])
 
     @property
     def dc_gain(self) -> float:
-        """The value at s = 0; infinite with a pole there."""
+        """Return the value at s = 0; infinite with a pole there."""
         above, below = float(self.numerator[-1]), float(self.denominator[-1])
         return above / below + 0.0 if below else float(np.copysign(np.inf, above))     # no -0
 
     @property
     def final_value(self) -> float:
-        """What the response to a unit step settles at; NaN if it does not."""
+        """Return what the response to a unit step settles at; NaN if it does not."""
         settles = (self.poles.real < -STANDING * np.abs(self.poles)).all()
         return self.dc_gain if settles else float('nan')
 
@@ -85,7 +85,7 @@ class TransferFunction:
 
     @property
     def expr(self) -> Any:
-        """The fraction as a ``sympy.Expr`` in ``s``, with floating-point coefficients."""
+        """Return the fraction as a ``sympy.Expr`` in ``s``, with floating-point coefficients."""
         from lg_husky_sim.linear_graph.transfer import expression
         return expression(self.numerator, self.denominator)
 

@@ -55,7 +55,7 @@ class Output:
 
     @property
     def progress(self) -> Any:
-        """What the functions of the API take as ``progress``."""
+        """Return what the functions of the API take as ``progress``."""
         from lg_husky_sim.api.progress import Lines
 
         if self.quiet:

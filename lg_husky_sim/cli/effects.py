@@ -15,7 +15,8 @@ from lg_husky_sim.cli.common import EFFECT, model_option, Output, spoken
 @model_option('--robot', '--model', 'robot')
 @spoken()
 def command(effect: str | None, robot: Path | None, say: Output) -> None:
-    """List the effects that a model can have, or the parameters of one.
+    """
+    List the effects that a model can have, or the parameters of one.
 
     Typical values and bounds of parameters are in proportion to the robot. diagnose looks for all
     of these effects except static_friction and tyre_windup.

@@ -14,7 +14,8 @@ from lg_husky_sim.cli.common import MODEL, Output, spoken
 @click.argument('model', required=False, metavar='[FILE.yaml]', type=MODEL)
 @spoken()
 def command(model: Path | None, say: Output) -> None:
-    """List the parameters of a model file, of the packaged Husky by default.
+    """
+    List the parameters of a model file, of the packaged Husky by default.
 
     low and high bound the 95 % interval of an estimate; lower and upper are what the model
     accepts. tolerance is the relative standard deviation assumed before a fit.

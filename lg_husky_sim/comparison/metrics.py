@@ -74,7 +74,7 @@ class Tracking:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """The paper's bounds: largest absolute error in x and in y [m]; NaN without samples."""
+        """Return the paper's bounds: largest absolute error in x and y [m]; NaN without any."""
         known = self.error[np.all(np.isfinite(self.error), axis=1)]
         if not len(known):
             return math.nan, math.nan
@@ -83,7 +83,7 @@ class Tracking:
 
     @property
     def absolute_sum(self) -> float:
-        """The paper's objective, eq. (23): sum of absolute errors in x and y [m]."""
+        """Return the paper's objective, eq. (23): sum of absolute errors in x and y [m]."""
         return float(np.nansum(np.abs(self.error)))
 
 
@@ -97,6 +97,7 @@ def measured_channels(segment: Segment) -> dict[str, TimeSeries]:
     Parameters
     ----------
     segment : Segment
+        Its wheels, pose and imu are read, as far as it has them.
 
     Returns
     -------
@@ -129,6 +130,7 @@ def predicted_at(prediction: TimeSeries, name: str, times: FloatArray) -> FloatA
     Parameters
     ----------
     prediction : TimeSeries
+        Columns of the simulator, in the order of time.
     name : str
         Channel; NaN everywhere if the prediction lacks it.
     times : numpy.ndarray, shape (n,)
@@ -158,6 +160,7 @@ def channel_pairs(segment: Segment, prediction: TimeSeries
     Parameters
     ----------
     segment : Segment
+        With the streams that were measured.
     prediction : TimeSeries
         Columns of the simulator.
 
@@ -183,6 +186,7 @@ def channel_errors(segment: Segment, prediction: TimeSeries) -> dict[str, Square
     Parameters
     ----------
     segment : Segment
+        With the streams that were measured.
     prediction : TimeSeries
         Columns of the simulator.
 

@@ -89,6 +89,7 @@ def plants_in(
     Parameters
     ----------
     plants : sequence of NamedPlant
+        Models with their labels; those without an onset stay as they are.
     name : str
         Name of the recording.
     names : sequence of str

@@ -99,6 +99,7 @@ def compare_recording(
     recording : Recording
         With a stream ``command`` and something measured.
     plants : sequence of NamedPlant
+        Models to replay the commands through, with their labels.
     rival : tuple of str and Recording, optional
         Label and recording of the same drive by another simulator (or on another day), put
         beside the models.
@@ -180,6 +181,7 @@ def text_table(outcomes: Sequence[RecordingOutcome]) -> str:
     Parameters
     ----------
     outcomes : sequence of RecordingOutcome
+        One for each recording.
 
     Returns
     -------

@@ -39,6 +39,7 @@ def simulate_recording(
     Parameters
     ----------
     plant : Plant
+        Robot to drive, taken as it is in that recording.
     recording : Recording
         With a stream ``command``.
     torque_per_current : float
@@ -83,6 +84,7 @@ def simulate_commands(
     Parameters
     ----------
     plant : Plant
+        Robot to drive, with its sensors.
     commands : TimeSeries
         Names forward [m/s], yaw [rad/s].
     torque_per_current : float

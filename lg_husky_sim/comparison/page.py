@@ -89,11 +89,17 @@ def report_data(
     Parameters
     ----------
     outcomes : sequence of RecordingOutcome
+        One for each recording.
     plants : sequence of NamedPlant
+        Models that were replayed, with their labels and files.
     horizon : float
+        Time after which each prediction started anew [s]; 0 only at gaps.
     settings : mapping of str to float, optional
+        Parameters that were set by hand, by name, for a note.
     provenance : Provenance, optional
+        Of what files and versions the report is made.
     advice : sequence of Advice
+        What to change on the robot and in the simulator.
 
     Returns
     -------

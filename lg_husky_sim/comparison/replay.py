@@ -62,6 +62,7 @@ def initial_state(segment: Segment, plant: Plant, window: float = WINDOW) -> Ini
     Parameters
     ----------
     segment : Segment
+        Its pose, wheels and imu are read, as far as it has them.
     plant : Plant
         For the ratio of wheel speed to speed.
     window : float
@@ -114,6 +115,7 @@ def replay(
     Parameters
     ----------
     plant : Plant
+        Robot to drive, taken as it is in the segment's recording.
     segment : Segment
         With a stream ``command``.
     period : float

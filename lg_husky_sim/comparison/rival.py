@@ -29,9 +29,11 @@ def rival_prediction(rival: Recording, recording: Recording, segment: Segment) -
     Parameters
     ----------
     rival : Recording
+        Of the same drive, by another simulator or on another day.
     recording : Recording
         The one that the segment belongs to.
     segment : Segment
+        Stretch of the recording that the prediction is for.
 
     Returns
     -------

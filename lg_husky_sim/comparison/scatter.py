@@ -56,6 +56,7 @@ def scatter_notes(segments: Sequence[Segment], least: float) -> tuple[str, ...]:
     Parameters
     ----------
     segments : sequence of Segment
+        Stretches of all recordings; the poses count.
     least : float
         Smallest error of a model's forward speed [m/s].
 

@@ -32,6 +32,7 @@ def write_comparison_bag(path: Path, outcome: RecordingOutcome, overwrite: bool 
     path : pathlib.Path
         Folder of the rosbag2; ``path.foxglove.json`` and ``path.plotjuggler.xml`` stand beside it.
     outcome : RecordingOutcome
+        A recording with the predictions of all models.
     overwrite : bool
         Replace a rosbag2 that is there.
 
@@ -108,6 +109,7 @@ def comparison_signals(outcome: RecordingOutcome
     Parameters
     ----------
     outcome : RecordingOutcome
+        A recording with the predictions of all models.
 
     Returns
     -------

@@ -135,11 +135,15 @@ def error_table(title: str, parts: Sequence[Predicted], columns: Sequence[str], 
     Parameters
     ----------
     title : str
+        Heading of the table.
     parts : sequence of (Segment, mapping of str to TimeSeries)
+        Measured stretches, each with its predictions by column.
     columns : sequence of str
+        Models, in the order of the table.
     compared : tuple of str and str, optional
         Columns from and to which a change is given.
     held_out : bool
+        Whether these are data that no model was fitted to.
 
     Returns
     -------
@@ -176,6 +180,7 @@ def change_intervals(parts: Sequence[Predicted], before: str, after: str
     Parameters
     ----------
     parts : sequence of (Segment, mapping of str to TimeSeries)
+        Measured stretches, each with its predictions by column.
     before, after : str
         Columns.
 

@@ -48,7 +48,7 @@ class CommercialBase:
 
     @property
     def words(self) -> str:
-        """What the base does, in words."""
+        """Return what the base does, in words."""
         dead = f'{self.values["dead_time"]:.2f}'
         late = '' if float(dead) == 0.0 else f', acts {dead} s late'
         return ('a base that limits its acceleration at '
@@ -75,6 +75,7 @@ def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
     about : str
         Of the model that is returned.
     pool : Executor
+        Threads to fit with.
 
     Returns
     -------

@@ -61,6 +61,7 @@ def error_tables(diagnosis: Diagnosis, changed: bool = False) -> tuple[ErrorTabl
     Parameters
     ----------
     diagnosis : Diagnosis
+        With the errors of its models, on all data and on held-out data.
     changed : bool
         Whether the question was what changed between recordings.
 

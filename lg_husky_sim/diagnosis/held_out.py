@@ -32,7 +32,9 @@ def errors(plant: Plant, segments: Sequence[Segment], names: Sequence[str] = ()
     Parameters
     ----------
     plant : Plant
+        Robot to drive, taken as it is in each segment's recording.
     segments : sequence of Segment
+        Measured stretches, with their commands.
     names : sequence of str, optional
         Of all recordings in the order in which they were made, whichever of them are here: an
         effect that begins in one of them is absent in those before it.
@@ -71,6 +73,7 @@ def split(segments: Sequence[Segment]) -> tuple[tuple[Segment, ...], tuple[Segme
     Parameters
     ----------
     segments : sequence of Segment
+        Of one recording or several, in the order of time.
 
     Returns
     -------
@@ -110,7 +113,9 @@ def held_out_errors(found: Search, parts: Sequence[Segment]
     Parameters
     ----------
     found : Search
+        With the fits of the plain model and of the one with all that was adopted.
     parts : sequence of Segment
+        Of all recordings; to be split into those to fit and those to hold out.
 
     Returns
     -------

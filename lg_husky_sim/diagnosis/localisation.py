@@ -77,6 +77,7 @@ def steady_knots(drive: Drive, count: int) -> np.typing.NDArray[np.bool_]:
     Parameters
     ----------
     drive : Drive
+        Its logged commands tell when a command changes.
     count : int
         Evenly spaced knots from its start to its end.
 
@@ -110,6 +111,7 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fit was made.
     fit : Fit
         Of the model in doubt.
 
@@ -244,6 +246,7 @@ def where_it_shows(evidence: Evidence, gain: FloatArray) -> str:
     Parameters
     ----------
     evidence : Evidence
+        Its drives say when each innovation was, in the same order.
     gain : numpy.ndarray, shape (n,)
         Of each innovation [nats].
 

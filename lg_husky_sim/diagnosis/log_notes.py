@@ -56,6 +56,7 @@ def reading_notes(drives: Sequence[Drive], reading: Reading) -> tuple[str, ...]:
     Parameters
     ----------
     drives : sequence of Drive
+        Say which rates were logged.
     reading : Reading
         As estimated; of rates of the moment nothing is said.
 

@@ -65,15 +65,19 @@ def model_mismatch(found: Sequence[Difference], search: Search, plain_out: Mappi
     found : sequence of Difference
         At least one.
     search : Search
+        Not used: names of effects mean nothing on another robot.
     plain_out : mapping of str to float
         Errors of the recalibrated model on held-out data.
     recordings : sequence of Recording
+        In which the parts lie.
     parts : sequence of Segment
+        Segments, to be split into those to fit and those to hold out.
     nominal : ModelFile
         With what of the robot is known already.
     faults : sequence of Fault
         Of the sensors that the nominal model has in it.
     pool : Executor
+        Threads to fit with.
 
     Returns
     -------

@@ -50,6 +50,7 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
     Parameters
     ----------
     diagnosis : Diagnosis
+        The answer, with its findings and errors.
     changed : bool
         Whether the question was what changed between recordings.
 
@@ -109,9 +110,11 @@ def write_files(folder: Path, case: Case | ChangeCase, with_report: bool = True,
     folder : pathlib.Path
         An empty folder.
     case : Case or ChangeCase
+        The diagnosis, with the model in doubt and the segments it was made of.
     with_report : bool
         Whether to write report.html and the pictures too.
     provenance : Provenance, optional
+        Of what files and versions the report is made.
 
     Returns
     -------

@@ -199,7 +199,9 @@ def recorded(rival: Rival, manoeuvre: Manoeuvre) -> Drive:
     Parameters
     ----------
     rival : Rival
+        The explanation, as a model with its numbers.
     manoeuvre : Manoeuvre
+        Driven from rest.
 
     Returns
     -------
@@ -230,7 +232,9 @@ def imitated(truth: Rival, other: Rival, manoeuvre: Manoeuvre) -> tuple[float, s
     Parameters
     ----------
     truth, other : Rival
+        The explanation that is recorded, and the one that is refitted to it.
     manoeuvre : Manoeuvre
+        Driven from rest by both.
 
     Returns
     -------
@@ -283,7 +287,9 @@ def plan(one: Rival, two: Rival, manoeuvres: Sequence[Manoeuvre],
     Parameters
     ----------
     one, two : Rival
+        Explanations, as models with their numbers; each has to imitate the other.
     manoeuvres : sequence of Manoeuvre
+        Drives to rank.
     progress : callable, optional
         Called after each.
 

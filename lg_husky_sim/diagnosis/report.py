@@ -101,6 +101,7 @@ def headline(diagnosis: Diagnosis, warnings: Sequence[str] = (), *, changed: boo
     Parameters
     ----------
     diagnosis : Diagnosis
+        With verdict, confidence and findings.
     warnings : sequence of str
         What speaks against it.
     changed : bool
@@ -163,6 +164,7 @@ def advice(diagnosis: Diagnosis, shapes: Mapping[tuple[str, str], str], *,
     Parameters
     ----------
     diagnosis : Diagnosis
+        Its findings say what to change.
     shapes : mapping of (str, str) to str
         Variant of form of each effect of the model, by its id and side.
     changed : bool
@@ -330,7 +332,9 @@ def report_data(
     Parameters
     ----------
     diagnosis : Diagnosis
+        With verdict, findings, notes and what remains.
     recordings : sequence of str
+        Their names, for the title.
     traces : sequence of Trace
         Of :func:`~lg_husky_sim.reporting.data.diagnosis_trace`.
     errors : sequence of ErrorTable
@@ -344,6 +348,7 @@ def report_data(
     view : View, optional
         What is shown first; the signal in which the finding helps most if not given.
     provenance : Provenance, optional
+        Of what files and versions the report is made.
     changed : bool
         Whether the question was what changed between recordings.
 

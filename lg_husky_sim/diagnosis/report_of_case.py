@@ -53,7 +53,9 @@ def case_report(case: Case, provenance: Provenance | None = None) -> ReportData:
     Parameters
     ----------
     case : Case
+        The diagnosis, with the search and the segments it was made of.
     provenance : Provenance, optional
+        Of what files and versions the report is made.
 
     Returns
     -------
@@ -213,6 +215,7 @@ def new_terms(model: ModelFile, plain: Structure) -> list[str]:
     model : ModelFile
         With what was found.
     plain : Structure
+        Without what was found: its elements are not new.
 
     Returns
     -------

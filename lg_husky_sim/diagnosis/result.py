@@ -107,7 +107,7 @@ class Finding:
 
     @property
     def chance(self) -> str:
-        """The p value in words; empty where there is none."""
+        """Return the p value in words; empty where there is none."""
         if math.isnan(self.p_value):
             return ''
         return f'p = {self.p_value:.1g}' if self.p_value > LEAST_CHANCE else (
@@ -200,7 +200,7 @@ class Diagnosis:
 
     @property
     def misfit(self) -> str:
-        """What does not fit where the model is not one of this robot, a stream or all of it."""
+        """Return what does not fit where the model is of another robot, a stream or all of it."""
         stream = bool(self.findings) and self.findings[0].subsystem == Subsystem.SENSOR.value
         return ('A stream of these recordings cannot be right' if stream
                 else 'This model does not fit this robot')
@@ -218,7 +218,7 @@ class Diagnosis:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What speaks against the answer: held-out losses, parameters that are implausible."""
+        """Return what speaks against the answer: held-out losses, implausible parameters."""
         return (*self._losses(), *(
             implausible_words(self.strained, self.added) if self.fits else ()))
 
@@ -290,6 +290,7 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
     Parameters
     ----------
     diagnosis : Diagnosis
+        With whatever was found; also a change between recordings.
 
     Returns
     -------

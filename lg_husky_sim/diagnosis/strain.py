@@ -46,7 +46,7 @@ class Strained:
 
     @property
     def factor(self) -> float:
-        """The value over the nominal one."""
+        """Return the value over the nominal one."""
         return self.value / self.nominal
 
     @property

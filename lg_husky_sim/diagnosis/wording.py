@@ -53,6 +53,7 @@ def sized(numbers: Sequence[Estimate]) -> tuple[Estimate, ...]:
     Parameters
     ----------
     numbers : sequence of Estimate
+        Parameters of a finding, with their intervals.
 
     Returns
     -------

@@ -57,7 +57,9 @@ def driven(segment: FitSegment, channel: Channel, time_constant: float, delay: f
     Parameters
     ----------
     segment : FitSegment
+        With its commands and the state at its start.
     channel : Channel
+        Says which commands matter, and whether values are increments over a window.
     time_constant, delay : float
         [s]; a time constant of 0 is no lag.
 
@@ -129,6 +131,7 @@ def fit_lags(data: Observations) -> dict[str, Lag]:
     Parameters
     ----------
     data : Observations
+        Measured channels of all segments, with their commands.
 
     Returns
     -------
@@ -188,6 +191,7 @@ def fit_kinematics(data: Observations, parameters: Parameters) -> Kinematics:
     Parameters
     ----------
     data : Observations
+        Measured channels of all segments, with their commands.
     parameters : Parameters
         For what cannot be fitted: radius and track where no wheel rates were recorded.
 

@@ -46,6 +46,7 @@ def table(result: CaseResult) -> Table:
     Parameters
     ----------
     result : CaseResult
+        Of one case: its drives by manoeuvre, each predicted by all models.
 
     """
     reference = paper().tracking_error
@@ -82,6 +83,7 @@ def parameter_table(result: CaseResult) -> Table:
     Parameters
     ----------
     result : CaseResult
+        Of one case: fits by both methods.
 
     """
     rows = []
@@ -113,6 +115,7 @@ def verdict(result: CaseResult) -> list[str]:
     Parameters
     ----------
     result : CaseResult
+        Of one case: its drives and fits.
 
     Returns
     -------
@@ -175,6 +178,7 @@ def figures(result: CaseResult) -> tuple[tuple[Chart, ...], tuple[Drawing, ...]]
     Parameters
     ----------
     result : CaseResult
+        Of one case: its drives and the history of the genetic algorithm.
 
     Returns
     -------

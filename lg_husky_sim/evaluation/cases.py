@@ -55,6 +55,7 @@ def synthetic_case(seed: int) -> Case:
     Parameters
     ----------
     seed : int
+        Of the sensors' noise.
 
     """
     config = engine_config()
@@ -80,6 +81,7 @@ def engine_case(seed: int) -> Case:
     Parameters
     ----------
     seed : int
+        Of the sensors' noise; not the same noise as of the synthetic case.
 
     """
     config = engine_config()
@@ -114,10 +116,12 @@ def recorded_case(calibrate: Sequence[str], held_out: Sequence[str], rivals: Seq
     calibrate : sequence of str
         Exactly one recording to calibrate on.
     held_out : sequence of str
+        Recordings to predict, any number.
     rivals : sequence of str
         Another simulator's recordings of the same drives, in the order of the two before; or
         none.
     topics : TopicMap, optional
+        Of the recordings, where they are chosen by hand; not of the rivals.
 
     Raises
     ------
@@ -147,10 +151,13 @@ def sensed(name: str, commands: TimeSeries, truth: TimeSeries, draws: np.random.
     Parameters
     ----------
     name : str
+        Of the recording.
     commands : TimeSeries
+        Names forward [m/s], yaw [rad/s].
     truth : TimeSeries
         Columns wheel_left, wheel_right, yaw_rate, accel_x, x, y and heading.
     draws : numpy.random.Generator
+        Where the noise comes from; it is advanced.
     sensors : mapping
         Standard deviations: wheel, gyro, acceleration, position, heading.
 

@@ -179,6 +179,7 @@ def drive(robot: EngineRobot, commands: TimeSeries, rate: float = 50.0) -> TimeS
     Parameters
     ----------
     robot : EngineRobot
+        Bodies, tyres and speed loop, and the time step of the engine.
     commands : TimeSeries
         Names forward [m/s], yaw [rad/s]; from rest.
     rate : float

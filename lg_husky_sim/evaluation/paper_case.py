@@ -101,14 +101,17 @@ def evaluate_case(case: Case, model: ModelFile, seed: int, starts: int = STARTS,
     Parameters
     ----------
     case : Case
+        Recordings by manoeuvre; the first one is to calibrate on.
     model : ModelFile
         To start from.
     seed : int
+        Of the searches.
     starts : int
         Of each least-squares estimation.
     jobs : int
         Processes to use.
     tell : callable, optional
+        Called with a word on every step of the fits.
 
     Returns
     -------

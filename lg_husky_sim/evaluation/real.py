@@ -90,12 +90,15 @@ def evaluate_steps(recording: Recording, model: ModelFile, seed: int = 0, starts
     Parameters
     ----------
     recording : Recording
+        With commanded steps: at least :data:`FEWEST`.
     model : ModelFile
         With the paper's numbers, or another robot's nominal ones.
     seed, starts, jobs : int
+        Seed of the fits, starts of each fit, and processes to use.
     effects : sequence of str, optional
         Added to the graph for the last model; those of ``config/evaluation.yaml`` by default.
     tell : callable, optional
+        Called with a word on every step of the fits.
 
     Returns
     -------

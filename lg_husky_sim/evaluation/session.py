@@ -97,11 +97,13 @@ def run_evaluation(request: Request, out: Path, tell: Callable[[str], None],
     Parameters
     ----------
     request : Request
+        What to evaluate, with which model and how.
     out : pathlib.Path
         Gets index.html, evaluation.json, evaluation.txt, the pictures and the fitted models.
     tell : callable
         Called with a word after each unit of work.
     provenance : Provenance, optional
+        Of what files and versions the page is made.
 
     Returns
     -------
@@ -143,9 +145,13 @@ def report_data(request: Request, results: Sequence[CaseResult], steps: Sequence
     Parameters
     ----------
     request : Request
+        What was evaluated, with which model and how.
     results : sequence of CaseResult
+        One for each case.
     steps : sequence of StepsResult
+        One for each recording of steps.
     made_of : Provenance, optional
+        Of what files and versions the report is made.
 
     Returns
     -------

@@ -50,6 +50,7 @@ def steps_of(data: Observations) -> tuple[Step, ...]:
     Parameters
     ----------
     data : Observations
+        Segments with their commands.
 
     Returns
     -------
@@ -87,6 +88,7 @@ def alternate_steps(data: Observations) -> tuple[Observations, Observations]:
     Parameters
     ----------
     data : Observations
+        To be divided.
 
     Returns
     -------
@@ -107,7 +109,9 @@ def within(data: Observations, steps: Sequence[Step]) -> Observations:
     Parameters
     ----------
     data : Observations
+        To be chosen from.
     steps : sequence of Step
+        As :func:`steps_of` finds them; other values are left out.
 
     """
     segments = []

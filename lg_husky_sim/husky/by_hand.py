@@ -161,10 +161,12 @@ def with_numbers(parameters: Parameters, own: Collection[str],
     Parameters
     ----------
     parameters : Parameters
+        With the values and bounds before.
     own : collection of str
         Names of the robot's own ones: their bounds are in proportion to it and move. Those of
         effects stay.
     settings : mapping of str to float or Number
+        Values by name, in the parameter's unit, or numbers with bounds.
 
     Raises
     ------

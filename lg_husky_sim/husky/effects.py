@@ -107,10 +107,9 @@ class EffectParameter:
         Forms that have it; empty for all.
     linear : bool
         Whether it is estimated on a linear scale though it has one sign only.
-    jitter : mapping of str to str
-        Of a delay: which jitter of a log it may come of, by the effect's shape.
-    delays : mapping of str to str
-        Of a delay that is always there: that of a log which does the same, by the effect's shape.
+    jitter, delays : mapping of str to str
+        By the effect's shape, of a delay: which jitter of a log it may come of; and, of one that
+        is always there, which delay of a log does the same.
     limits : str
         What it is the largest size of: 'voltage' or 'current' of a motor, or the commanded
         'forward' speed or 'yaw' rate; empty for no limit.
@@ -316,6 +315,7 @@ def check_distinct(effects: Iterable[Effect]) -> None:
     Parameters
     ----------
     effects : iterable of Effect
+        All those of one model.
 
     Raises
     ------

@@ -256,11 +256,15 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
     laws : numpy.ndarray of int64, shape (n_sets, n_efforts)
         Numbers of :class:`Law`.
     coefficients : numpy.ndarray, shape (n_sets, n_efforts, WIDTH)
+        Numbers of each law, in the order of its formula (SI).
     offsets : numpy.ndarray of int64, shape (n_sets, n_efforts)
         Where the arguments of each effort begin in ``z``.
     z : numpy.ndarray, shape (n_arguments,)
+        Arguments of all efforts, one effort after the other (SI).
     context : numpy.ndarray, shape (CONTEXT,)
+        Time, heading, x, y, both wheel angles and the sub-step.
     memory : numpy.ndarray, shape (MEMORY,)
+        Heat of the motors, play of the gears and what static friction gives way.
     out : numpy.ndarray, shape (n_efforts,)
         Receives the efforts; the last in series with a motor is the sum of them.
 

@@ -294,6 +294,7 @@ def compile_model(structure: Structure) -> HuskyModel:
     Parameters
     ----------
     structure : Structure
+        Drivetrain, effects and onset.
 
     Returns
     -------

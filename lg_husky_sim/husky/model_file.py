@@ -148,6 +148,7 @@ def apply_settings(model: ModelFile, settings: Mapping[str, float | Number],
     Parameters
     ----------
     model : ModelFile
+        Whose parameters are set.
     settings : mapping of str to float or Number
         Bounds of the robot's own parameters stay in proportion to its size, and move where a
         value is a little beyond.
@@ -234,6 +235,7 @@ def save_model(model: ModelFile, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     model : ModelFile
+        What is written, with all its parameters.
     path : path-like
         Replaced if a model file is there.
 

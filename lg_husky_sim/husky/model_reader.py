@@ -237,7 +237,9 @@ def _parameter(errors: list[str], name: str, entry: object, nominal: Parameter |
     errors : list of str
         Gets a line for each thing that is wrong; then nothing is returned.
     name : str
+        Of the parameter.
     entry : object
+        What the file says of it: a mapping, or its value alone.
     nominal : Parameter or None
         What it is where the file tells less; without, everything has to be told.
     robot : RobotSize or None

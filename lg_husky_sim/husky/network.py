@@ -137,6 +137,7 @@ def on_side(elements: Iterable[str], side: str) -> tuple[str, ...]:
     Parameters
     ----------
     elements : iterable of str
+        Names of elements of the graph.
     side : str
         ``left`` or ``right``; any other leaves all elements.
 

@@ -243,6 +243,7 @@ def acts(onset: Onset, times: FloatArray, x: FloatArray) -> np.typing.NDArray[np
     Parameters
     ----------
     onset : Onset
+        A time in the recording, or a place.
     times, x : numpy.ndarray, shape (n,)
         On the recording's clock [s], and where the robot is then [m]; NaN if not known.
 

@@ -68,7 +68,7 @@ class Confidence:
 
     @property
     def deviations(self) -> FloatArray:
-        """Standard deviations of the varied quantities."""
+        """Return the standard deviations of the varied quantities."""
         root: FloatArray = np.sqrt(np.diag(self.covariance))
         return root
 
@@ -97,6 +97,7 @@ def confidence(problem: Problem, solution: Solution) -> Confidence:
     problem : Problem
         With the metric of the last pass.
     solution : Solution
+        End of a search, with its derivatives.
 
     Returns
     -------
@@ -170,6 +171,7 @@ def undetermined(result: Confidence, values: FloatArray) -> tuple[str, ...]:
     Parameters
     ----------
     result : Confidence
+        Covariance and correlation of the estimates.
     values : numpy.ndarray, shape (n_unknowns,)
         Estimates.
 

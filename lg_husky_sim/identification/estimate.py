@@ -211,9 +211,11 @@ def channel_fits(data: Observations, segments: Sequence[Segment], before: ModelF
     Parameters
     ----------
     data : Observations
+        Measured channels to compare with.
     segments : sequence of Segment
         For the position, which is simulated from each segment's start without resets.
     before, after : ModelFile
+        Models as given and as fitted.
     solution : Solution, optional
         Holds the prediction of ``after`` with the recordings' own unknowns.
 

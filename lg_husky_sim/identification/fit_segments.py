@@ -111,7 +111,7 @@ class FitSegment:
 
     @property
     def name(self) -> str:
-        """Recording and number of the segment."""
+        """Return recording and number of the segment."""
         return f'{self.recording}/{self.index}'
 
     @property
@@ -186,6 +186,7 @@ def segment_for_fit(segment: Segment, settle: float = SETTLE) -> FitSegment | No
     Parameters
     ----------
     segment : Segment
+        With commands and what was measured.
     settle : float
         Data after the start that are not used where it begins in motion [s].
 

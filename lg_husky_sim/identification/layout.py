@@ -24,7 +24,7 @@ class Local(Protocol):
 
     @property
     def local(self) -> tuple[int, int] | None:
-        """Number of the segment, and of the column."""
+        """Return the number of the segment, and of the column."""
 
 
 class Layout:
@@ -73,6 +73,7 @@ class Layout:
         slope : numpy.ndarray, shape (n_values, columns)
             Packed.
         values : numpy.ndarray, shape (n_values,)
+            Whitened residuals, or what else there is for each value.
 
         Returns
         -------
@@ -125,7 +126,9 @@ class Layout:
         matrix : numpy.ndarray, shape (n_unknowns, n_unknowns)
             As :meth:`gram` gives it, with anything positive added to its diagonal.
         right : numpy.ndarray, shape (n_unknowns,)
+            Right-hand side, as :meth:`project` gives it.
         free : numpy.ndarray of bool, shape (n_unknowns,)
+            Which unknowns may move.
 
         Returns
         -------

@@ -197,7 +197,9 @@ class Problem:
         Parameters
         ----------
         varied : numpy.ndarray, shape (n_unknowns,)
+            Where: unknowns as they are varied, some by their logarithms.
         predicted : numpy.ndarray, shape (n_values,)
+            What the model says there.
         known : numpy.ndarray, shape (n_values, n_known), optional
             Columns of the first unknowns, taken over from a point nearby.
 
@@ -288,6 +290,7 @@ def solve(problem: Problem, start: Mapping[str, float], steps: int = 12,
     Parameters
     ----------
     problem : Problem
+        Data, model and metric, and the unknowns to vary.
     start : mapping of str to float
         Values to start from.
     steps : int

@@ -142,6 +142,7 @@ class ModalDecoupling:
         Parameters
         ----------
         candidates : numpy.ndarray, shape (n_candidates, n_free)
+            Values of the free parameters, a row each.
 
         Returns
         -------

@@ -72,7 +72,7 @@ class Ends:
 
     @property
     def evaluations(self) -> int:
-        """Simulations of all starts."""
+        """Return the number of simulations of all starts."""
         return sum(end.evaluations for end in self.all)
 
 
@@ -101,7 +101,9 @@ def first_metric(data: Observations, model: ModelFile) -> Metric:
     Parameters
     ----------
     data : Observations
+        Measured channels, which are predicted.
     model : ModelFile
+        As given, before any fit.
 
     Returns
     -------
@@ -123,11 +125,17 @@ def best_solution(data: Observations, model: ModelFile, unknowns: Sequence[Unkno
     Parameters
     ----------
     data : Observations
+        Measured channels, which are fitted.
     model : ModelFile
+        As given; the first start is at its values.
     unknowns : sequence of Unknown
+        What is varied.
     seed, starts, jobs : int
+        Seed of the starts, how many there are, and processes to use.
     scheduler : str or None
+        Address of a Dask scheduler, in place of processes.
     tell : callable
+        Called with the word ``start`` after each start.
 
     Returns
     -------
@@ -158,6 +166,7 @@ def judged(problem: Problem, ends: Ends) -> tuple[Problem, FloatArray]:
     problem : Problem
         With the noise that a fit's residual shows.
     ends : Ends
+        Where the searches ended, from each start.
 
     Returns
     -------
@@ -184,7 +193,9 @@ def noise_metric(data: Observations, residual: FloatArray, predicted: FloatArray
     Parameters
     ----------
     data : Observations
+        Channels and times of the values.
     residual, predicted : numpy.ndarray, shape (n_values,)
+        Measured less predicted, and predicted, in the unit of each channel.
 
     Returns
     -------
@@ -213,6 +224,7 @@ def is_autocorrelated(data: Observations, scaled: FloatArray, name: str) -> bool
     Parameters
     ----------
     data : Observations
+        Says which values are the channel's.
     scaled : numpy.ndarray, shape (n_values,)
         Residual times the metric's scale.
     name : str
@@ -239,11 +251,15 @@ def refine(data: Observations, model: ModelFile, unknowns: Sequence[Unknown],
     Parameters
     ----------
     data : Observations
+        Measured channels, which are fitted.
     model : ModelFile
+        With all parameters that are not varied.
     unknowns : sequence of Unknown
+        What is varied.
     start : mapping of str to float
         Values; the model's own where one is missing.
     tell : callable
+        Called with the word ``noise`` after each pass.
     steps : int
         Most Jacobians of a pass; 0 to stay and only find the noise and the derivatives.
 

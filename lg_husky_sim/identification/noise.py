@@ -65,7 +65,9 @@ def shared_of(observations: Observations, columns: FloatArray) -> Shared:
     Parameters
     ----------
     observations : Observations
+        Whose values the rows are.
     columns : numpy.ndarray, shape (n_values, n_common)
+        Errors that all values have in common, whitened.
 
     Returns
     -------
@@ -111,6 +113,7 @@ class Metric:
         Parameters
         ----------
         observations : Observations
+            Whose values these are; with their common errors, if any.
         values : numpy.ndarray, shape (n_values,) or (n_values, k)
             Residuals, or columns of derivatives.
 
@@ -132,6 +135,7 @@ class Metric:
         Parameters
         ----------
         observations : Observations
+            With the columns of their common errors, if any.
 
         Returns
         -------
@@ -153,7 +157,9 @@ class Metric:
         Parameters
         ----------
         observations : Observations
+            Whose values these are.
         values : numpy.ndarray, shape (n_values,) or (n_values, k)
+            Residuals, or columns of derivatives.
 
         Returns
         -------
@@ -215,6 +221,7 @@ def scales(observations: Observations, residual: FloatArray, predicted: FloatArr
     Parameters
     ----------
     observations : Observations
+        Channels and times of the values.
     residual, predicted : numpy.ndarray, shape (n_values,)
         Of a fit.
 
@@ -256,9 +263,11 @@ def robust(observations: Observations, left: FloatArray, scale: FloatArray, limi
     Parameters
     ----------
     observations : Observations
+        Whose values these are.
     left : numpy.ndarray, shape (n_values,)
         Residual that neither a fit nor any candidate explains.
     scale : numpy.ndarray, shape (n_values,)
+        One over the standard deviation, as :func:`scales` gives it.
     limit : float
         Robust deviations from which a value loses weight.
 
@@ -286,6 +295,7 @@ def metric(observations: Observations, residual: FloatArray, scale: FloatArray,
     Parameters
     ----------
     observations : Observations
+        Whose values these are.
     residual : numpy.ndarray, shape (n_values,)
         With everything projected out that could be physics, so that none of it passes for noise.
     scale : numpy.ndarray, shape (n_values,)

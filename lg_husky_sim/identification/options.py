@@ -42,6 +42,7 @@ def with_effects(model: ModelFile, texts: Sequence[str]) -> ModelFile:
     Parameters
     ----------
     model : ModelFile
+        That effects are added to.
     texts : sequence of str
         As :func:`effect_in` reads them; those that are in the model already are passed over.
 

@@ -76,7 +76,7 @@ class Track:
 
     @property
     def times(self) -> FloatArray:
-        """Times of the measured positions [s]."""
+        """Return the times of the measured positions [s]."""
         at: FloatArray = self.start + (self.steps + self.shares) * PERIOD
         return at
 
@@ -87,6 +87,7 @@ class Track:
         Parameters
         ----------
         plant : Plant
+            Robot to drive, taken as it is in the track's recording.
 
         """
         if plant.onset is not None:
@@ -108,6 +109,7 @@ def track_of(segment: Segment, recordings: Sequence[str] = ()) -> Track | None:
     Parameters
     ----------
     segment : Segment
+        With commands and a pose.
     recordings : sequence of str
         Names of all that are fitted, in their order.
 
@@ -200,7 +202,7 @@ class PaperObjective:
 
     @property
     def steps(self) -> int:
-        """Simulation steps of one candidate."""
+        """Return the number of simulation steps of one candidate."""
         return sum(len(track.commands) for track in self.tracks)
 
     def __call__(self, candidates: FloatArray) -> FloatArray:
@@ -210,6 +212,7 @@ class PaperObjective:
         Parameters
         ----------
         candidates : numpy.ndarray, shape (n_candidates, n_free)
+            Values of the free parameters, a row each.
 
         Returns
         -------

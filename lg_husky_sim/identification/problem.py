@@ -123,6 +123,7 @@ class Observations:
         Parameters
         ----------
         plant : Plant
+            Robot to drive, taken as it is in each segment's recording.
         extra : mapping of str to float, optional
             Small unknowns of the observation that belong to no effect: latency,
             delay_wheels, delay_imu, delay_pose [s], gyro_bias [rad/s]; and corrections of the
@@ -167,6 +168,7 @@ class Observations:
         Parameters
         ----------
         plant : Plant
+            Robot to drive, taken as it is in each segment's recording.
         latency : float
             Further dead time of the commands [s].
         corrections : numpy.ndarray, shape (n_segments, 4), optional
@@ -202,6 +204,7 @@ class Observations:
         Parameters
         ----------
         plant : Plant
+            That was simulated; its sensors read.
         grids : sequence of numpy.ndarray
             Of :meth:`simulate`.
         extra : mapping of str to float, optional
@@ -249,7 +252,9 @@ def late_mask(plant: Plant, segment: FitSegment, times: FloatArray) -> NDArray[n
     Parameters
     ----------
     plant : Plant
+        With an onset, or without one.
     segment : FitSegment
+        Its pose says where the robot was.
     times : numpy.ndarray, shape (n,)
         On the recording's clock [s].
 
@@ -299,6 +304,7 @@ def observations(segments: Sequence[Segment], settle: float = SETTLE) -> Observa
     Parameters
     ----------
     segments : sequence of Segment
+        Of all recordings that are fitted.
     settle : float
         Data after the start of a moving segment that are not used [s].
 

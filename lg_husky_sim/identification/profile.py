@@ -50,6 +50,7 @@ def profile(problem: Problem, solution: Solution, name: str, deviation: float,
     Parameters
     ----------
     problem : Problem
+        That was solved, the parameter among its unknowns.
     solution : Solution
         Its end.
     name : str

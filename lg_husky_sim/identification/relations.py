@@ -57,6 +57,7 @@ def links(observations: Observations) -> tuple[Link, ...]:
     Parameters
     ----------
     observations : Observations
+        Whose channels may have errors of one motion.
 
     Returns
     -------
@@ -98,6 +99,7 @@ def apart(observations: Observations, parts: Mapping[str, Mapping[str, float]],
     Parameters
     ----------
     observations : Observations
+        Whose values these are.
     parts : mapping of str to mapping of str to float
         By channel and source, as :func:`coefficients` gives it.
     values : numpy.ndarray, shape (n_values,) or (n_values, k)
@@ -167,6 +169,7 @@ def coefficients(observations: Observations, residual: FloatArray, scale: FloatA
     Parameters
     ----------
     observations : Observations
+        Whose values these are.
     residual : numpy.ndarray, shape (n_values,)
         With everything projected out that could be physics.
     scale : numpy.ndarray, shape (n_values,)

@@ -111,6 +111,7 @@ def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile,
     Parameters
     ----------
     result : FitResult
+        Fitted model with its estimates.
     segments : sequence of Segment
         That were fitted.
     before : ModelFile
@@ -118,6 +119,7 @@ def write_fit(result: FitResult, segments: Sequence[Segment], before: ModelFile,
     out : pathlib.Path
         Model file; the report's files stand beside it.
     provenance : Provenance, optional
+        Of what files and versions the report is made.
     advice : sequence of Advice
         What to change, from what still differs from the fitted model.
 
@@ -156,10 +158,13 @@ def report_data(result: FitResult, segments: Sequence[Segment], before: ModelFil
     Parameters
     ----------
     result : FitResult
+        Fitted model with its estimates.
     segments : sequence of Segment
         That were fitted.
     before : ModelFile
+        The model to show beside the fitted one.
     provenance : Provenance, optional
+        Of what files and versions the report is made.
 
     Returns
     -------
@@ -282,6 +287,7 @@ def convergence_chart(history: FloatArray, name: str = 'convergence') -> Chart:
     history : numpy.ndarray, shape (n_generations + 1, 2)
         Best and mean cost [m].
     name : str
+        Of the picture's file, without its ending.
 
     Returns
     -------

@@ -161,14 +161,14 @@ class FitResult:
 
     @property
     def losses(self) -> tuple[ChannelFit, ...]:
-        """What the fitted model predicts worse than the one before, driven by commands alone."""
+        """Return what the fitted model predicts worse than the one before, driven by commands."""
         return tuple(one for one in self.driven
                      if one.after > (1.0 + setting('worse')) * one.before
                      and one.after > least_noise(one.name))
 
     @property
     def loss(self) -> str:
-        """The same in a sentence; '' for nothing."""
+        """Return these losses in a sentence; '' for nothing."""
         said = ', '.join(f'{quantity(one.name)} {change(one.before, one.after)}'
                          for one in self.losses)
         return ('Driven by the commands alone, the fitted model predicts worse than the one '

@@ -81,9 +81,11 @@ def genetic(objective: Objective, lower: FloatArray, upper: FloatArray, seed: in
     objective : callable
         Costs, shape (n,), of candidates, shape (n, n_free).
     lower, upper : numpy.ndarray, shape (n_free,)
+        Bounds of each free parameter.
     seed : int
         The same seed gives the same result to the last bit.
     progress : callable, optional
+        Called with the number of a generation and the best cost so far.
     population, generations : int, optional
         100 and 100, as in the paper, if not given.
     crossover_fraction : float, optional
@@ -175,9 +177,11 @@ def differential_evolution(objective: Objective, lower: FloatArray, upper: Float
     objective : callable
         Costs, shape (n,), of candidates, shape (n, n_free).
     lower, upper : numpy.ndarray, shape (n_free,)
+        Bounds of each free parameter.
     seed : int
         The same seed gives the same result to the last bit.
     progress : callable, optional
+        Called with the number of a generation and the best cost so far.
     generations : int, optional
         At most; as in ``config/paper.yaml`` if not given.
 

@@ -31,6 +31,7 @@ def simulate_segment(simulator: Simulator, segment: FitSegment, latency: float =
     simulator : Simulator
         At :data:`PERIOD`.
     segment : FitSegment
+        With its commands, and what was measured at the start and at the resets.
     latency : float
         Further dead time of the commands [s].
     correction : numpy.ndarray, shape (4,), optional

@@ -112,13 +112,17 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
     Parameters
     ----------
     request : Request
+        Model, free parameters and method of all fits.
     paths : sequence of str
         On a cluster, every worker must be able to read them.
     out : pathlib.Path
         Folder; gets NAME.yaml, .txt, .json and .html for each recording.
     jobs : int
+        Processes to use.
     scheduler : str, optional
+        Address of a Dask scheduler, in place of processes.
     tell : callable, optional
+        Called with the word ``recording`` after each recording.
 
     Returns
     -------

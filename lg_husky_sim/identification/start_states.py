@@ -80,6 +80,7 @@ def settle_of(structure: Structure, nuisance: Sequence[str]) -> float:
     Parameters
     ----------
     structure : Structure
+        Effects of the command, and delays, reach back.
     nuisance : sequence of str
         Unknowns of the recordings.
 
@@ -104,6 +105,7 @@ def remembered(plant: Plant, settle: float) -> tuple[int, ...]:
     Parameters
     ----------
     plant : Plant
+        As given, before the fit.
     settle : float
         When the first values are used [s].
 
@@ -137,6 +139,7 @@ def start_unknowns(data: Observations, plant: Plant, settle: float,
     Parameters
     ----------
     data : Observations
+        Segments, of which some begin in motion.
     plant : Plant
         As given, before the fit.
     settle : float
@@ -187,6 +190,7 @@ def start_states(data: Observations, unknowns: Sequence[Unknown], values: Sequen
     Parameters
     ----------
     data : Observations
+        In which the segments stand.
     unknowns : sequence of Unknown
         Those with a segment of their own.
     values : sequence of float
@@ -223,6 +227,7 @@ def summary(starts: Sequence[StartState]) -> list[tuple[str, ...]]:
     Parameters
     ----------
     starts : sequence of StartState
+        Of all segments, in any order.
 
     Returns
     -------

@@ -41,6 +41,7 @@ def free_names(model: ModelFile, asked: Sequence[str]) -> tuple[str, ...]:
     Parameters
     ----------
     model : ModelFile
+        Says which parameters there are, and which are free by default.
     asked : sequence of str
         As the user asked; empty for the model's own choice.
 
@@ -82,6 +83,7 @@ def unknowns_of(model: ModelFile, names: Sequence[str], nuisance: Sequence[str],
     Parameters
     ----------
     model : ModelFile
+        With the values and bounds of the parameters.
     names : sequence of str
         Parameters, of the robot or of its effects.
     nuisance : sequence of str
@@ -138,9 +140,13 @@ def starts_of(model: ModelFile, unknowns: Sequence[Unknown], count: int, seed: i
     Parameters
     ----------
     model : ModelFile
+        Whose values are the first start.
     unknowns : sequence of Unknown
+        What is varied.
     count : int
+        Number of starts; one is made at least.
     seed : int
+        Of the spread.
 
     Returns
     -------
@@ -186,7 +192,9 @@ def search_bounds(parameters: Parameters, names: Sequence[str]
     Parameters
     ----------
     parameters : Parameters
+        Values and bounds of the robot.
     names : sequence of str
+        Parameters that are searched, in the order of the bounds.
 
     Returns
     -------

@@ -36,11 +36,13 @@ def descriptor(structure: Structure, values: Sequence[Any], s: Any, one: Any, ou
     Parameters
     ----------
     structure : Structure
+        Analysed graph, with rules for its elements.
     values : sequence
         Number or rational function of each of ``structure.values``.
     s, one : same type
         The Laplace variable and the number one.
     output : Variable
+        Whose row is the last.
     source : int
         Which input; the other inputs and the efforts of laws that are not linear are zero.
 
@@ -162,6 +164,7 @@ def determinants(field: RationalField, rows: list[Row]) -> tuple[Any, Any]:
     Parameters
     ----------
     field : RationalField
+        To which the entries of the rows belong.
     rows : list of dict
         What :func:`between` has left of a :func:`descriptor` of rational functions.
 

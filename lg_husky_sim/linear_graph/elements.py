@@ -151,7 +151,7 @@ class Characteristic:
 
     @property
     def expression(self) -> str:
-        """The law as an expression in z1, z2, ... and the parameters."""
+        """Return the law as an expression in z1, z2, ... and the parameters."""
         return expression_of(self.law, len(self.of), self.parameters)
 
     @property
@@ -258,7 +258,7 @@ class Branch:
 
     @property
     def given_form(self) -> Form | None:
-        """The form, or its default; None for elements without one."""
+        """Return the form, or its default; None for elements without one."""
         return self.form or default_form(self.kind, self.domain)
 
     @property

@@ -48,12 +48,12 @@ class Sum:
 
     @property
     def text(self) -> str:
-        """The equation in plain text."""
+        """Return the equation in plain text."""
         return ' = '.join((*self.left, _signed([(s, v) for s, v in self.right])))
 
     @property
     def latex(self) -> str:
-        """The equation in LaTeX."""
+        """Return the equation in LaTeX."""
         right = _signed([(s, latex_of(v)) for s, v in self.right])
         return ' = '.join((*(latex_of(v) for v in self.left), right))
 

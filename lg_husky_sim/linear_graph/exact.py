@@ -55,6 +55,7 @@ def exact_fraction(structure: Structure, values: Mapping[str, float], source: in
     Parameters
     ----------
     structure : Structure
+        Analysed graph; its first output counts.
     values : mapping of str to float
         Parameters by name, SI.
     source : int

@@ -128,6 +128,7 @@ def export(space: StateSpace, path: str | os.PathLike[str], name: str = 'model',
     Parameters
     ----------
     space : StateSpace
+        Matrices, with the names of states, inputs and outputs.
     path : path-like
         .json, .mat (MATLAB 5), .npz (NumPy), .h (C), .tex (LaTeX, amsmath) or .py (a module that
         makes python-control and scipy objects). An export that is there is replaced.

@@ -125,6 +125,7 @@ def step_figures(modes: Modes, final: float, end: float) -> StepFigures:
     Parameters
     ----------
     modes : Modes
+        Those that a step response is made of, with poles [1/s].
     final : float
         What it settles at; NaN if it does not.
     end : float

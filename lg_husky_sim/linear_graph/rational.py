@@ -102,7 +102,7 @@ class RationalField:
 
     @property
     def one(self) -> Any:
-        """The number one."""
+        """Return the number one."""
         return self._field.one
 
     def element(self, text: str) -> Any:

@@ -37,6 +37,7 @@ def is_rounding(matrix: FloatArray, right: FloatArray, solution: FloatArray) -> 
     Parameters
     ----------
     matrix, right, solution : numpy.ndarray, shapes (n, n), (n, m), (n, m)
+        Coefficients, right-hand sides and what solves them.
 
     """
     largest = np.abs(solution).max(initial=0.0)
@@ -57,6 +58,7 @@ def culprits(matrix: FloatArray) -> tuple[int, ...]:
     Parameters
     ----------
     matrix : numpy.ndarray, shape (n, n)
+        Coefficients of the equations, in any units.
 
     Returns
     -------
@@ -84,6 +86,7 @@ def singular_error(graph: LinearGraph, owners: Sequence[str], values: Mapping[st
     Parameters
     ----------
     graph : LinearGraph
+        Says which of the elements are two-ports or modulated sources.
     owners : sequence of str
         Elements whose equations they are.
     values : mapping of str to float

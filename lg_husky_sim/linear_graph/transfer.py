@@ -62,6 +62,7 @@ def transfer_function(graph: LinearGraph, output: str, source: str, *, by_elemen
     Parameters
     ----------
     graph : LinearGraph
+        Of any elements; laws that are not linear count for nothing.
     output, source : str
         A variable, and the name of an input.
     by_element : bool
@@ -164,6 +165,7 @@ def step_response(space: StateSpace, times: ArrayLike, source: int) -> FloatArra
     Parameters
     ----------
     space : StateSpace
+        Whose outputs are wanted; all of them are returned.
     times : array_like, shape (n_times,)
         Equally spaced from 0 [s].
     source : int
@@ -255,6 +257,7 @@ def frequency_response(space: StateSpace, rates: ArrayLike, output: int, source:
     Parameters
     ----------
     space : StateSpace
+        In which the output and the input stand.
     rates : array_like, shape (k,)
         Angular frequencies [rad/s].
     output, source : int

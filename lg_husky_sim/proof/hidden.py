@@ -68,10 +68,8 @@ class Change:
         New values of fields of the robot, `CommandPath` and `Faults` entries.
     side
         'left', 'right', 'both' or 'none'.
-    parameters
-        The true size, for the answer: name to value (SI).
-    form
-        The functional form, in words.
+    parameters, form
+        For the answer: the true size, name to value (SI), and the functional form, in words.
     gusts
         Force of the wind [N] (it is a disturbance, not a field).
 

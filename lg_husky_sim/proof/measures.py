@@ -37,6 +37,8 @@ def increments(poses: Vector, times: Vector, window: float = _WINDOW) -> Vector:
         Columns time, x, y [m], heading [rad], shape (n, 4).
     times
         Starts of the windows [s], shape (m,).
+    window
+        How long each is [s].
 
     Returns
     -------

@@ -124,7 +124,9 @@ def gusts(force: float, headings: Vector, rng: Rng) -> Vector:
     force
         Its rms [N].
     headings
-        Heading of the robot at these times [rad].
+        Heading of the robot at these times [rad], shape (n,).
+    rng
+        Draws the gusts, and where the wind comes from.
 
     """
     from scipy.signal import lfilter

@@ -29,7 +29,7 @@ class Rate:
 
     @property
     def bar(self) -> tuple[float, bool] | None:
-        """The number aimed at, and whether it is an upper one."""
+        """Return the number aimed at, and whether it is an upper one."""
         numbers: Mapping[str, float] = settings()['targets'].get(self.target, {})
         for key, at_most in (('least', False), ('most', True)):
             if key in numbers:

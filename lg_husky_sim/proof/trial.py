@@ -52,7 +52,7 @@ class Folders:
 
     @property
     def cases(self) -> Path:
-        """Recordings, one folder a case."""
+        """Return where the recordings are, one folder a case."""
         return (self.cases_of or self.root) / 'cases'
 
     @property
@@ -62,17 +62,17 @@ class Folders:
 
     @property
     def held_out(self) -> Path:
-        """Recordings that no diagnosis is given."""
+        """Return where the recordings are that no diagnosis is given."""
         return self.root / 'held_out'
 
     @property
     def runs(self) -> Path:
-        """What the diagnoses wrote."""
+        """Return where the files are that the diagnoses wrote."""
         return self.root / 'runs'
 
     @property
     def commitments(self) -> Path:
-        """Commitments to the answers."""
+        """Return the file of the commitments to the answers."""
         return self.root / 'commitments.json'
 
     @property

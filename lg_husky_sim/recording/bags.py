@@ -82,6 +82,7 @@ def open_bag(path: Path) -> Iterator[Bag | Rosbag2]:
     Parameters
     ----------
     path : pathlib.Path
+        Folder of a rosbag2, or a single file.
 
     Yields
     ------

@@ -26,6 +26,7 @@ def clean(name: str, times: FloatArray, values: FloatArray, notes: list[str]) ->
     times : numpy.ndarray, shape (n,)
         Stamps [s] in any order.
     values : numpy.ndarray, shape (n, k)
+        A row for each stamp.
     notes : list of str
         Gets a line for what was dropped.
 

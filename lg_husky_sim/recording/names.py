@@ -62,6 +62,7 @@ def named_as_in(recordings: Sequence[Recording], known: Collection[str]
     Parameters
     ----------
     recordings : sequence of Recording
+        Under the names of their folders or files.
     known : collection of str
         Names of recordings in a model file, some with the folders that told them apart.
 

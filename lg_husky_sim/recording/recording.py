@@ -172,6 +172,7 @@ def segments(recording: Recording, gap: float = DEFAULT_GAP) -> tuple[Segment, .
     Parameters
     ----------
     recording : Recording
+        With any of the streams, on one clock.
     gap : float
         Longest silence within a segment [s], positive.
 
@@ -248,6 +249,7 @@ def windows(segment: Segment, length: float) -> tuple[Segment, ...]:
     Parameters
     ----------
     segment : Segment
+        To be cut from its start on.
     length : float
         Length of a window [s], positive.
 
@@ -281,6 +283,7 @@ def cut(
     Parameters
     ----------
     streams : mapping of str to TimeSeries
+        By name, each in the order of time [s].
     start, end : float
         Bounds [s], both inclusive. The command that holds at `start` becomes its first row.
 

@@ -94,6 +94,7 @@ def refuse_large_chunks(path: Path) -> None:
     Parameters
     ----------
     path : pathlib.Path
+        The .mcap file; it is read, not changed.
 
     Raises
     ------

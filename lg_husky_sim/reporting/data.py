@@ -82,7 +82,7 @@ class Trace:
 
     @property
     def unit(self) -> str:
-        """Unit of the channel."""
+        """Return the unit of the channel."""
         return QUANTITIES.get(self.channel, ('', ''))[1]
 
 
@@ -97,10 +97,13 @@ def diagnosis_trace(
     Parameters
     ----------
     recording, channel : str
+        Names of the recording and of the quantity.
     times, measured, nominal, recalibrated : numpy.ndarray, shape (n,)
+        Stamps [s], and what was measured and predicted [unit of the channel].
     with_finding : numpy.ndarray, shape (n,), optional
         None where nothing was found.
     sigma : numpy.ndarray, shape (n,), optional
+        Standard deviation expected of measured − predicted [unit of the channel].
 
     Returns
     -------

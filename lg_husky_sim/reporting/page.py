@@ -73,6 +73,7 @@ def error_cells(table: ErrorTable) -> Table:
     Parameters
     ----------
     table : ErrorTable
+        A row for each quantity, an error for each model.
 
     Returns
     -------
@@ -189,6 +190,7 @@ def page(data: ReportData, view: View | None, images: Mapping[str, bytes],
     Parameters
     ----------
     data : ReportData
+        What the report says and shows.
     view : View or None
         Of the first picture.
     images : mapping of str to bytes

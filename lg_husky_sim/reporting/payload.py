@@ -92,6 +92,7 @@ def payload(data: ReportData, view: View | None, jumps: Mapping[int, int]) -> st
     Parameters
     ----------
     data : ReportData
+        What the report shows; its traces are packed.
     view : View or None
         What is shown first.
     jumps : mapping of int to int

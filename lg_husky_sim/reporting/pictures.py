@@ -49,6 +49,7 @@ def png(figure: Figure, about: Mapping[str, str] | None = None) -> bytes:
     Parameters
     ----------
     figure : matplotlib.figure.Figure
+        Drawn at the dots per inch of all pictures.
     about : mapping of str to str, optional
         What the file says of itself, by the keywords of the PNG specification (``Title``,
         ``Description``, ``Source``, ``Software``). A picture on its own tells what it shows.
@@ -104,7 +105,9 @@ def draw_signal(axes: Axes, trace: Trace, styles: Mapping[str, LineStyle],
     Parameters
     ----------
     axes : matplotlib Axes
+        Where to draw; they get a title, a label and limits.
     trace : Trace
+        Measured and predicted values of one quantity.
     styles : mapping of str to LineStyle
         By column, in the order of drawing.
     start, end : float
@@ -145,7 +148,9 @@ def first_picture(data: ReportData, view: View) -> Figure:
     Parameters
     ----------
     data : ReportData
+        With a trace of what the view shows.
     view : View
+        Recording, quantity and stretch [s] to draw.
 
     Returns
     -------
@@ -182,6 +187,7 @@ def responses_picture(data: ReportData, recording: str, longest: float = LONGEST
     Parameters
     ----------
     data : ReportData
+        With the traces of the recording.
     recording : str
         With at least one trace.
     longest : float
@@ -232,6 +238,7 @@ def path_picture(data: ReportData, recording: str, longest: float = LONGEST,
     Parameters
     ----------
     data : ReportData
+        With the traces of the recording.
     recording : str
         With traces of x and y.
     longest : float
@@ -277,6 +284,7 @@ def draw_path(axes: Axes, x: Trace, y: Trace, styles: Mapping[str, LineStyle],
     Parameters
     ----------
     axes : matplotlib Axes
+        Where to draw; they get one scale for x and y.
     x, y : Trace
         Of one recording, at the same times.
     styles : mapping of str to LineStyle
@@ -320,6 +328,7 @@ def draw_intervals(axes: Axes, numbers: Sequence[tuple[str, str, float, float, f
     Parameters
     ----------
     axes : matplotlib Axes
+        Where to draw; a row for each number.
     numbers : sequence of (str, str, float, float, float)
         Name, unit, estimate, low and high of each.
 
@@ -344,6 +353,7 @@ def chart_picture(chart: Chart) -> Figure:
     Parameters
     ----------
     chart : Chart
+        Lines, with the titles of the axes.
 
     Returns
     -------

@@ -50,7 +50,7 @@ class LineStyle:
 
     @property
     def drawn(self) -> dict[str, Any]:
-        """The style as matplotlib takes it."""
+        """Return the style as matplotlib takes it."""
         return {'color': self.light, 'linestyle': _DASHES[self.dash], 'linewidth': self.width}
 
 
@@ -66,6 +66,7 @@ def column_styles(columns: Sequence[str]) -> dict[str, LineStyle]:
     Parameters
     ----------
     columns : sequence of str
+        Models, in the order of the report.
 
     Returns
     -------

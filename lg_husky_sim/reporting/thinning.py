@@ -32,6 +32,7 @@ def thinned(trace: Trace, most: int) -> Trace:
     Parameters
     ----------
     trace : Trace
+        Measured and predicted values of one quantity.
     most : int
         Samples that it may have, apart from those beside gaps.
 
@@ -69,6 +70,7 @@ def paired(x: Trace, y: Trace, most: int) -> tuple[Trace, Trace]:
     x, y : Trace
         Of one recording, at the same times.
     most : int
+        Samples that each may have.
 
     Returns
     -------

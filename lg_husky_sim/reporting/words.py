@@ -67,6 +67,7 @@ def number(value: float, digits: int = 3) -> str:
     Parameters
     ----------
     value : float
+        Without its unit.
     digits : int
         Significant digits.
 

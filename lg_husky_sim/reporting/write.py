@@ -61,6 +61,7 @@ def write_report(data: ReportData, folder: Path, name: str = REPORT, *,
     Parameters
     ----------
     data : ReportData
+        What the report says and shows.
     folder : pathlib.Path
         An existing folder.
     name : str
@@ -103,6 +104,7 @@ def view_of(data: ReportData) -> View | None:
     Parameters
     ----------
     data : ReportData
+        Its traces tell, unless it has a view.
 
     Returns
     -------
@@ -150,6 +152,7 @@ def drawn(data: ReportData, pictured: int = MOST_PICTURED,
     Parameters
     ----------
     data : ReportData
+        What the report says and shows.
     pictured : int
         Recordings that get pictures of their signals and path.
     on_progress : callable, optional

@@ -255,6 +255,7 @@ def solve(plant: Packed, c: int, s: FloatArray, n: int, time: float, h: float, b
     before : float
         Length of the step before [s], whose parabola is FORMER; 0 after a jump.
     work : Work
+        Scratch arrays, with the efforts at the start; those of the step are put there.
 
     Returns
     -------

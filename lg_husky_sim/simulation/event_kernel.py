@@ -203,7 +203,9 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
     fine : bool
         Whether x and y are wanted to better than 1e-7 m; else they are arcs between the points.
     plant : Packed
+        As :func:`~lg_husky_sim.simulation.modes.packed` makes it.
     work : Work
+        Scratch arrays of the plant's sizes; what is in them before means nothing.
 
     Returns
     -------

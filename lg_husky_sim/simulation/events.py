@@ -145,6 +145,7 @@ class Propagator:
         Parameters
         ----------
         events : Events
+            Commands with their stamps, and the times that are wanted.
         initial : numpy.ndarray, shape (n + TAIL,)
             Flat state, of :meth:`initial`; its time is replaced by the events' start.
         fine_pose : bool
@@ -197,6 +198,7 @@ def trajectory(plant: Plant, commands: TimeSeries, times: ArrayLike, *,
     Parameters
     ----------
     plant : Plant
+        Robot to drive, as it is in one recording.
     commands : TimeSeries
         Names forward [m/s], yaw [rad/s]; each holds from its own stamp until the next.
     times : array_like, shape (n_times,)

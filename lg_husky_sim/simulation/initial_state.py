@@ -65,6 +65,7 @@ class InitialStates:
         Parameters
         ----------
         pose : Pose, optional
+            Place [m] and heading [rad] of the base; the origin if not given.
         twist : BodyTwist, optional
             Velocity of the base; at rest if not given.
         time : float

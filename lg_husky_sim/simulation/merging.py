@@ -32,6 +32,7 @@ def merged(plant: PlantSet) -> PlantSet:
     Parameters
     ----------
     plant : PlantSet
+        Matrices and laws of one regime.
 
     Returns
     -------

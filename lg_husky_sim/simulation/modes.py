@@ -69,6 +69,7 @@ def modes_of(a: FloatArray, mixing: tuple[FloatArray, FloatArray] | None = None)
     Parameters
     ----------
     a : numpy.ndarray, shape (n, n)
+        Of x' = a x, real [1/s].
     mixing : tuple of numpy.ndarray, shapes (n, n), optional
         Matrix of coordinates in which a may fall apart into blocks, such as the mean of both
         sides and their difference, and its inverse; modes then stay apart to the last bit.
@@ -180,6 +181,7 @@ def packed(plant: Plant) -> Packed:
     Parameters
     ----------
     plant : Plant
+        With one set of matrices, or two where effects begin at an onset.
 
     Returns
     -------

@@ -44,23 +44,23 @@ class SimulatorState:
 
     @property
     def n(self) -> int:
-        """Number of states of graph and controllers."""
+        """Return the number of states of graph and controllers."""
         return len(self.states)
 
     @property
     def time(self) -> float:
-        """Simulated time [s]."""
+        """Return the simulated time [s]."""
         return float(self.flat[self.n + 6])
 
     @property
     def pose(self) -> Pose:
-        """True pose."""
+        """Return the true pose."""
         flat = self.flat
         return Pose(float(flat[self.n + 4]), float(flat[self.n + 5]), float(flat[self.n + 3]))
 
     @property
     def twist(self) -> BodyTwist:
-        """True velocity of the base."""
+        """Return the true velocity of the base."""
         return BodyTwist(float(self.row[2]), float(self.row[3]))
 
     @property
@@ -134,6 +134,7 @@ class Simulator:
         Parameters
         ----------
         pose : Pose, optional
+            Place [m] and heading [rad] of the base; the origin if not given.
         twist : BodyTwist, optional
             Velocity of the base; at rest if not given.
         time : float
@@ -174,6 +175,7 @@ class Simulator:
         Parameters
         ----------
         state : SimulatorState
+            At the start of the step.
         command : BodyTwist
             Given now, and held over the step.
 
@@ -192,6 +194,7 @@ class Simulator:
         Parameters
         ----------
         state : SimulatorState
+            To start from.
         commands : numpy.ndarray, shape (n_steps, 2)
             Forward speed [m/s] and yaw rate [rad/s].
 
@@ -227,6 +230,7 @@ class Simulator:
         Parameters
         ----------
         state : SimulatorState
+            Of a simulator of any drivetrain and effects.
 
         Returns
         -------
@@ -301,6 +305,7 @@ def rollout(plant: Plant, commands: TimeSeries, end: float, period: float = 0.02
     Parameters
     ----------
     plant : Plant
+        Robot to drive, as it is in one recording.
     commands : TimeSeries
         Names forward [m/s], yaw [rad/s]; each holds from its own stamp on. One from before the
         start counts as given there.

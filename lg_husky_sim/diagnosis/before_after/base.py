@@ -84,7 +84,9 @@ def base_of(settings: Settings, nominal: Parameters, given: bool = False,
     Parameters
     ----------
     settings : Settings
+        Quantities with their starts and deviations, and constants of the simulation.
     nominal : Parameters
+        Of the model in doubt; where quantities without a start of their own begin.
     given : bool
         Whether the wheels turn as measured.
     interval : float

@@ -342,6 +342,7 @@ def simulate(p: FloatArray, fixed: FloatArray, step: float, command: FloatArray,
     wheels : numpy.ndarray, shape (n + 1, 2, n_lanes)
         Measured wheel rates [rad/s]; followed where `given`.
     given : bool
+        Whether the wheels turn as measured; else they are driven by the commands.
     start : numpy.ndarray, shape (5, n_lanes)
         Forward and lateral speed, yaw rate, wheel rates.
     lanes : tuple of int

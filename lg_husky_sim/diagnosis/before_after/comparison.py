@@ -105,6 +105,7 @@ def compare(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chang
     Parameters
     ----------
     fits : RecordingFits
+        Of all recordings, before and after the change.
     later : collection of str
         Names of the recordings after the change.
     adopted : sequence of Change
@@ -170,12 +171,14 @@ def refitted(fits: RecordingFits, later: Collection[str], adopted: Sequence[Chan
     Parameters
     ----------
     fits : RecordingFits
+        Of all recordings, before and after the change.
     later : collection of str
         Names of the recordings after the change.
     adopted : sequence of Change
         What differs; its parameters are wide open, the others as wide as recordings differ.
         A limit may be anywhere that a change brings it to.
     pool : Executor
+        Threads to fit with.
 
     Returns
     -------

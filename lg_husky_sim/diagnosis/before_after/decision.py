@@ -48,7 +48,7 @@ class Decision:
 
     @property
     def features(self) -> dict[str, float]:
-        """What the confidence is made of."""
+        """Return what the confidence is made of."""
         return {'gain': self.gain, 'chance': self.chance}
 
     @property
@@ -121,7 +121,9 @@ def decide(body: Block | None, loop: Block, settings: Settings) -> Decision:
     body : Block or None
         None where the recordings lack what it takes.
     loop : Block
+        What the fits by the commands say of every change.
     settings : Settings
+        Odds and limits of the decision.
 
     Returns
     -------
@@ -160,8 +162,11 @@ def foremost(body: Block | None, loop: Block, settings: Settings) -> Decision | 
     Parameters
     ----------
     body : Block or None
+        What the fits at the measured wheel rates say; None without what they take.
     loop : Block
+        What the fits by the commands say of every change.
     settings : Settings
+        Odds and limits of the decision.
 
     Returns
     -------
@@ -190,10 +195,13 @@ def unnamed(body: Block | None, loop: Block, explained: float, settings: Setting
     Parameters
     ----------
     body : Block or None
+        What the fits at the measured wheel rates say; None without what they take.
     loop : Block
+        What the fits by the commands say of every change.
     explained : float
         What the claimed changes gain together [nats]; 0 where none is.
     settings : Settings
+        Odds and limits of the decision.
 
     Returns
     -------

@@ -38,13 +38,17 @@ def dispersed(base: Base, groups: Mapping[str, Sequence[Drive]], places: Mapping
     Parameters
     ----------
     base : Base
+        Robot whose parameters were fitted.
     groups : mapping of str to sequence of Drive
         By recording.
     places : mapping of str to numpy.ndarray, shape (n,)
         Where each recording was fitted, on the scale of the estimates.
     noise : Noise
+        Filters and standard deviations by channel, to be widened.
     prior : Prior
+        Of the parameters; its precision counts beside the data.
     pool : Executor
+        Threads, one recording each.
 
     Returns
     -------

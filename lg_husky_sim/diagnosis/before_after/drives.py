@@ -111,6 +111,7 @@ def drives(recording: Recording, step: float, widths: Mapping[str, float], settl
     Parameters
     ----------
     recording : Recording
+        With commands, and at least one of wheels, imu and pose.
     step : float
         Of the simulation [s].
     widths : mapping of str to float

@@ -248,7 +248,7 @@ class Evidence:
 
     @cached_property
     def without_one(self) -> tuple[Evidence, ...]:
-        """This without each of the recordings; none where a set has no other one."""
+        """Return this without each of the recordings; none where a set has no other one."""
         later = sum(one.after for one in self.quadratics)
         if min(later, len(self.quadratics) - later) < 2:
             return ()

@@ -104,10 +104,15 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
     Parameters
     ----------
     base : Base
+        Robot to fit, with the bounds of its parameters.
     drives : sequence of Drive
+        All are fitted at once.
     prior : Prior
+        Means and standard deviations of the parameters, and which are free.
     noise : Noise
+        What residuals and derivatives are whitened with.
     begin : numpy.ndarray, shape (n,)
+        Where to begin, on the scale of the estimates; moved inside the bounds.
     steps : int
         With derivatives of their own, at most.
     enough : float

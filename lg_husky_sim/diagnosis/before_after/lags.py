@@ -24,6 +24,7 @@ def lags_of(recordings: Sequence[Recording], baseline: Sequence[Recording], base
     recordings, baseline : sequence of Recording
         After and before the change.
     base : Base
+        Says which parameters are delays, and against which stream they are.
 
     Returns
     -------

@@ -33,9 +33,11 @@ def with_limits(base: Base, drives: Sequence[Drive], noise: Noise, prior: Prior,
     Parameters
     ----------
     base : Base
+        Robot that was fitted, with its limits.
     drives : sequence of Drive
         Of the recording.
     noise : Noise
+        What residuals are whitened with.
     prior : Prior
         Whose free parameters count.
     places : mapping of str to numpy.ndarray, shape (n,)

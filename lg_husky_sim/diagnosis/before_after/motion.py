@@ -78,7 +78,9 @@ def moved(base: Base, drive: Drive, robots: FloatArray, memory: Memory | None = 
     Parameters
     ----------
     base : Base
+        Says how long a step is, and whether the wheels turn as measured.
     drive : Drive
+        Its commands, or its measured wheel rates, move the robots.
     robots : numpy.ndarray, shape (m, n)
         Their parameters, in units; one, or as many as go together at most.
     memory : Memory, optional

@@ -69,7 +69,9 @@ def predicted(base: Base, drive: Drive, robots: FloatArray, motion: FloatArray
     Parameters
     ----------
     base : Base
+        Says how wide bins are, and whether the wheels turn as measured.
     drive : Drive
+        Its bins are predicted.
     robots : numpy.ndarray, shape (m, n)
         Their parameters, in units.
     motion : numpy.ndarray, shape (n_steps + 1, n_outputs, n_lanes)
@@ -151,7 +153,9 @@ def residuals(base: Base, drive: Drive, places: Sequence[FloatArray]
     Parameters
     ----------
     base : Base
+        Robot, with the scale of its parameters.
     drive : Drive
+        Its bins are what was measured.
     places : sequence of numpy.ndarray, shape (n,)
         On the scale of the estimates.
 
@@ -186,7 +190,9 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
     Parameters
     ----------
     base : Base
+        Robot, with the step of each difference quotient.
     drive : Drive
+        Its bins are what was measured.
     z : numpy.ndarray, shape (n,)
         On the scale of the estimates.
     free : numpy.ndarray of bool, shape (n,)

@@ -75,6 +75,7 @@ class RecordingFits:
         expected : mapping of str to Prior
             By recording, what is expected of it; its fit begins where it was, and there.
         pool : Executor
+            Threads, one recording each.
 
         Returns
         -------
@@ -117,12 +118,15 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
     Parameters
     ----------
     base : Base
+        Robot to fit.
     drives : sequence of Drive
+        Of all recordings, whichever set they are of.
     lags : mapping of str to numpy.ndarray, shape (n,)
         By how much the streams of each recording are late, on the scale of the estimates.
     begin : numpy.ndarray, shape (n,)
         Where the fits begin.
     pool : Executor
+        Threads, one recording each.
     share : callable
         Told how far it is (0 to 1).
 

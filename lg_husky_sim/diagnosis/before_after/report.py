@@ -39,7 +39,9 @@ def change_report(case: ChangeCase, provenance: Provenance | None = None) -> Rep
     Parameters
     ----------
     case : ChangeCase
+        The diagnosis, with the segments it was made of.
     provenance : Provenance, optional
+        Of what files and versions the report is made.
 
     Returns
     -------

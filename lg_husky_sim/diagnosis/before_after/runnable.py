@@ -36,9 +36,11 @@ def started(nominal: ModelFile, base: Mapping[str, float], settings: Settings) -
     Parameters
     ----------
     nominal : ModelFile
+        In doubt; what is not set from the base stays as it is.
     base : mapping of str to float
         Parameters of the base robot [their units].
     settings : Settings
+        Constants of the simulation and of the fits.
 
     Returns
     -------
@@ -156,6 +158,7 @@ def fitted(options: Sequence[ModelFile], segments: Sequence[Segment], evaluation
     options : sequence of ModelFile
         Where the fit may begin; it does where the segments are met best.
     segments : sequence of Segment
+        Measured stretches, with their commands.
     evaluations : int
         Steps at most.
     about : str

@@ -53,7 +53,9 @@ def select(compared: Compared, settings: Settings) -> Selection:
     Parameters
     ----------
     compared : callable
+        Gives both blocks from what is adopted and what the later recordings are fitted with.
     settings : Settings
+        Odds and limits of the decision, and how many changes are adopted at most.
 
     Returns
     -------

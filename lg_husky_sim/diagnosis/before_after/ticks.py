@@ -45,6 +45,7 @@ def at_own_ticks(fits: RecordingFits, pool: Threads) -> tuple[Drive, ...] | None
     fits : RecordingFits
         With commands that are applied as they come, and the wheels not as measured.
     pool : Threads
+        Threads for the search and the fits.
 
     Returns
     -------

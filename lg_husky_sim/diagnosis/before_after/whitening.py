@@ -99,6 +99,7 @@ def noise_of(residuals: Sequence[Mapping[str, FloatArray]],
     vigours : sequence of mapping of str to numpy.ndarray
         Of each drive, by stream.
     settings : Settings
+        Order of the filters, and how often variances are estimated anew.
     grows : bool
         Whether variances grow with the motion.
 

@@ -34,6 +34,7 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
     gain : float
         [nats]
     hypothesis : Hypothesis
+        That gained it; one with an onset was tried at every onset.
     tried : int
         Number of hypotheses and starts.
     evidence : Evidence

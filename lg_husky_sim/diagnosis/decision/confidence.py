@@ -56,7 +56,9 @@ def informs(verdict: Verdict, features: Features) -> tuple[float, ...]:
     Parameters
     ----------
     verdict : Verdict
+        What is to be informed about: each has features of its own.
     features : Features
+        Gain, share and chance at the end of a search.
 
     Returns
     -------

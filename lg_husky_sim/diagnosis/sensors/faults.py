@@ -96,6 +96,7 @@ def faults(found: Sequence[Relation]) -> tuple[Fault, ...]:
     Parameters
     ----------
     found : sequence of Relation
+        Comparisons of the streams with each other.
 
     Returns
     -------

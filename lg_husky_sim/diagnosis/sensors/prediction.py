@@ -92,6 +92,7 @@ def body_fits(parts: Predicted) -> Mapping[str, ChannelFit]:
     Parameters
     ----------
     parts : sequence of (Segment, TimeSeries)
+        Measured stretches, each with its prediction.
 
     Returns
     -------
@@ -149,6 +150,7 @@ def wheel_fits(parts: Predicted) -> WheelFit | None:
     Parameters
     ----------
     parts : sequence of (Segment, TimeSeries)
+        Measured stretches, each with its prediction.
 
     Returns
     -------

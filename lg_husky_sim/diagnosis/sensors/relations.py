@@ -89,6 +89,7 @@ def relations(parts: Sequence[Segment]) -> tuple[Relation, ...]:
     Parameters
     ----------
     parts : sequence of Segment
+        Stretches of all recordings, with their streams.
 
     Returns
     -------

@@ -36,6 +36,7 @@ def certain(found: Sequence[Fault]) -> tuple[Fault, ...]:
     Parameters
     ----------
     found : sequence of Fault
+        All that the sensors show.
 
     Returns
     -------
@@ -57,6 +58,7 @@ def begun_with(start: Point, found: Sequence[Fault]) -> tuple[Point, tuple[Fault
     Parameters
     ----------
     start : Point
+        Model without the faults, and how its log is read.
     found : sequence of Fault
         Of :func:`certain`.
 

@@ -52,6 +52,7 @@ def differences(found: Sequence[Relation], parameters: Parameters) -> tuple[Diff
     Parameters
     ----------
     found : sequence of Relation
+        Comparisons of the streams with each other; speed of wheels and pose tells most.
     parameters : Parameters
         Of the model.
 
@@ -115,6 +116,7 @@ def impossible(fit: Fit, parameters: Parameters) -> tuple[Difference, ...]:
     Parameters
     ----------
     fit : Fit
+        Of the model, perhaps with effects, to the recordings.
     parameters : Parameters
         Nominal.
 

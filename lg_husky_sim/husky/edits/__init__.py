@@ -56,7 +56,9 @@ def edit(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     Parameters
     ----------
     network : EditedNetwork
+        Graph with command stage and sensors, perhaps edited already.
     effect : Effect
+        With its side and form.
 
     Returns
     -------
