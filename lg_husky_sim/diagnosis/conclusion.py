@@ -43,6 +43,7 @@ def estimates(fit: Fit, names: Sequence[str], units: Parameters) -> tuple[Estima
     Parameters
     ----------
     fit : Fit
+        Of a model to recordings; intervals are about its numbers.
     names : sequence of str
         Unknowns.
     units : Parameters
@@ -92,7 +93,9 @@ def without_undetermined(evidence: Evidence, fit: Fit) -> Point:
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fit was made.
     fit : Fit
+        Some of its numbers may not be determined by the data.
 
     Returns
     -------
@@ -190,6 +193,7 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     Parameters
     ----------
     search : Search
+        With what every round tried and what was adopted.
     rest : sequence of Effort
         Smooth efforts in what the search leaves, largest evidence first.
     free : sequence of Missing
@@ -252,6 +256,7 @@ def explained_by(search: Search) -> float:
     Parameters
     ----------
     search : Search
+        With the fits of the plain model and of the one with all that was adopted.
 
     Returns
     -------

@@ -51,7 +51,9 @@ def left_over(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fit was made.
     fit : Fit
+        What it leaves of the recordings is searched.
 
     Returns
     -------
@@ -70,6 +72,7 @@ def needed_evidence(rest: Sequence[Effort], free: Sequence[Missing]) -> float:
     Parameters
     ----------
     rest : sequence of Effort
+        Those of :func:`left_over`: as many as were found at all.
     free : sequence of Missing
         Each balance is looked at for bursts.
 
@@ -84,6 +87,7 @@ def remaining(search: Search) -> Search:
     Parameters
     ----------
     search : Search
+        That has adopted all it could name.
 
     Returns
     -------
@@ -111,9 +115,11 @@ def felt(rest: Sequence[Effort], free: Sequence[Missing], robot: RobotSize
     Parameters
     ----------
     rest : sequence of Effort
+        Those of :func:`left_over`.
     free : sequence of Missing
         Of all drives.
     robot : RobotSize
+        Says which size of an effort is negligible.
 
     Returns
     -------

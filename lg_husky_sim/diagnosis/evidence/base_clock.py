@@ -70,6 +70,7 @@ def ticker_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Ticker
     drive : Drive
         With the commands as they come.
     log : Reading
+        How the log was made: its delays and the windows of its rates.
     spread : float
         What the delays of commands vary by [s].
 
@@ -96,6 +97,7 @@ def ticking(evidence: Evidence, fit: Fit) -> list[list[Drive]]:
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fit was made.
     fit : Fit
         With commands that are applied as they come.
 

@@ -18,7 +18,9 @@ def step_inside(normal: FloatArray, slope: FloatArray, low: FloatArray, high: Fl
     Parameters
     ----------
     normal : numpy.ndarray, shape (k, k)
+        Normal matrix, positive definite.
     slope : numpy.ndarray, shape (k,)
+        Right-hand side: the step without bounds is ``normal^-1 slope``.
     low, high : numpy.ndarray, shape (k,)
         Least (at most zero) and largest (at least zero) move of each number.
 

@@ -57,7 +57,7 @@ class Ticker:
 
     @functools.cached_property
     def plain(self) -> float:
-        """The cost without a clock."""
+        """Return the cost without a clock."""
         return self._cost(self.commands, 0.0)
 
     def cost(self, clock: Clock) -> float:
@@ -192,7 +192,7 @@ class ClockSearch:
 
     @functools.cached_property
     def recordings(self) -> dict[str, list[Ticker]]:
-        """The drives of each."""
+        """Return the drives of each recording."""
         found: dict[str, list[Ticker]] = {}
         for ticker in self.tickers:
             found.setdefault(ticker.recording, []).append(ticker)

@@ -57,12 +57,12 @@ class Steps:
 
     @property
     def late(self) -> float:
-        """The mean delay [s]."""
+        """Return the mean delay [s]."""
         return float(self.weights @ self.delays / np.sum(self.weights))
 
     @property
     def scatter(self) -> float:
-        """The standard deviation of the delays [s]."""
+        """Return the standard deviation of the delays [s]."""
         return float(np.sqrt(self.weights @ (self.delays - self.late) ** 2
                              / np.sum(self.weights)))
 
@@ -77,6 +77,7 @@ class Steps:
         origin : float
             Phases are counted from here [s].
         count : int
+            Phases of each period, evenly spaced.
 
         Returns
         -------

@@ -50,6 +50,7 @@ class Differences:
         Parameters
         ----------
         point : Point
+            Where derivatives are taken.
         predicted : sequence of numpy.ndarray
             Readings of each drive there.
         which : sequence of int

@@ -26,6 +26,7 @@ def dispersion(evidence: Evidence, whitened: FloatArray, columns: FloatArray) ->
     Parameters
     ----------
     evidence : Evidence
+        Says which innovations lie in one block of time.
     whitened : numpy.ndarray, shape (n,)
         Innovations of all drives, in the order of time.
     columns : numpy.ndarray, shape (n, k)
@@ -54,6 +55,7 @@ def accident(evidence: Evidence, before: FloatArray, after: FloatArray) -> float
     Parameters
     ----------
     evidence : Evidence
+        Says which innovations lie in one stretch of time.
     before, after : numpy.ndarray, shape (n,)
         Innovations of all drives, in the order of time.
 

@@ -138,7 +138,7 @@ class Drive:
 
     @property
     def name(self) -> str:
-        """Recording and number of the segment."""
+        """Return recording and number of the segment."""
         return f'{self.recording}/{self.index}'
 
     @property
@@ -174,6 +174,7 @@ def smoothed(times: FloatArray, values: FloatArray, width: float) -> FloatArray:
     Parameters
     ----------
     times, values : numpy.ndarray, shape (n,)
+        Stamps [s], about evenly spaced, and the samples in any unit.
     width : float
         Time over which it smooths [s].
 
@@ -238,6 +239,7 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
     Parameters
     ----------
     segment : Segment
+        Commands and what was measured, without a gap.
     stamped : bool
         Whether the commands carry stamps of their own.
 
@@ -352,6 +354,7 @@ def drives_of(recordings: Sequence[Recording]) -> tuple[Drive, ...]:
     Parameters
     ----------
     recordings : sequence of Recording
+        Each with commands; their segments become drives.
 
     Returns
     -------

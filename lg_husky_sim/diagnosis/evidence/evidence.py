@@ -158,6 +158,7 @@ class Evidence:
         Parameters
         ----------
         start : Point
+            Where to begin, and which unknowns there are.
         slopes : sequence of numpy.ndarray, optional
             Derivatives of the readings of each drive by the places; those of ``renew`` are taken
             anew. All are where none are given.
@@ -232,6 +233,7 @@ class Evidence:
         Parameters
         ----------
         fit : Fit
+            Whose residuals tell the noise.
         rounds : int
             Largest number of steps.
         longest : str

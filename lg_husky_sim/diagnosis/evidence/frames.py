@@ -54,12 +54,15 @@ def frame_of(drive: Drive, plant: Plant, motion: Motion, predicted: FloatArray,
     Parameters
     ----------
     drive : Drive
+        Whose readings are to be whitened.
     plant : Plant
         Whose command stage makes voltages of commands.
     motion : Motion
+        A simulation of the drive that was looked at by the probe, too.
     predicted : numpy.ndarray, shape (n,)
         Observed of the motion.
     reading : Reading
+        How the log was made: its delays and the windows of its rates.
     reach : float
         How much earlier or later than on the mean a command may come [s].
 

@@ -141,6 +141,7 @@ class Whitener:
         change : numpy.ndarray, shape (n,)
             In the order of the readings.
         states : numpy.ndarray, shape (n, 12)
+            What the change has built up at each reading, in the states of the deviation model.
         on : numpy.ndarray of uint8, shape (n, m)
             Both in the order of time.
 
@@ -188,6 +189,7 @@ def negative_log_likelihood(whitened: FloatArray, scale: FloatArray) -> float:
     Parameters
     ----------
     whitened, scale : numpy.ndarray, shape (n,)
+        Innovations in standard deviations, and these in the units of the readings.
 
     """
     return student.cost(whitened) + float(np.sum(np.log(scale)))
@@ -241,6 +243,7 @@ def fit_noise(start: Noise, frames: Sequence[Frame], models: Sequence[FloatArray
     Parameters
     ----------
     start : Noise
+        Intensities to begin with.
     frames, models, residuals : sequence
         One a drive: its frame, the deviation model and the residuals of a simulation.
     pool : concurrent.futures.Executor

@@ -60,8 +60,7 @@ class Wanted:
     earlier : (TimeSeries, Events) or None
         Commands before the start, as they act, of a drive that begins in motion.
     parts : mapping of str to slice
-        Rows of ``wheels`` (ends of the windows), ``begins`` (their begins), ``imu``, ``pose`` and
-        ``probe``.
+        Rows of ``wheels``, ``begins`` (windows' ends and begins), ``imu``, ``pose``, ``probe``.
     spans : numpy.ndarray, shape (n_wheels,)
         Lengths of the windows [s].
 
@@ -81,13 +80,9 @@ class Motion:
 
     Parameters
     ----------
-    times : numpy.ndarray, shape (n,)
-        [s]
-    rows : numpy.ndarray, shape (n, 15)
-        Columns of the kernel.
-    wanted : Wanted
-    plant : Plant
-    drive : Drive
+    times, rows : numpy.ndarray, shapes (n,), (n, 15)
+        Times [s], and the columns of the kernel then.
+    wanted, plant, drive : Wanted, Plant, Drive
     delay : float
         How late the stamps of its pose are [s].
 
@@ -198,7 +193,9 @@ def simulate(plant: Plant, drive: Drive, reading: Reading, probe: bool = False) 
     plant : Plant
         As it is in the drive's recording.
     drive : Drive
+        Says when commands act and when sensors read.
     reading : Reading
+        How the log was made: its delays and the windows of its rates.
     probe : bool
         Whether to look at the motion at :func:`probe_times`, too.
 
@@ -321,8 +318,11 @@ def observe(motion: Motion, drive: Drive, reading: Reading) -> FloatArray:
     Parameters
     ----------
     motion : Motion
+        A simulation of the drive with the same reading.
     drive : Drive
+        Says when which channel was read.
     reading : Reading
+        How the log was made: its delays and the windows of its rates.
 
     Returns
     -------

@@ -57,7 +57,7 @@ class Point:
 
     @cached_property
     def plant(self) -> Plant:
-        """The plant with these numbers."""
+        """Return the plant with these numbers."""
         return compile_model(self.structure).at(self.numbers)
 
     @cached_property

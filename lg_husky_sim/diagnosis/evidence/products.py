@@ -22,7 +22,9 @@ def normal_matrix(columns: FloatArray, weights: FloatArray) -> FloatArray:
     Parameters
     ----------
     columns : numpy.ndarray, shape (n, m)
+        Taken a few rows at a time, to need little memory.
     weights : numpy.ndarray, shape (n,)
+        Of each row.
 
     Returns
     -------

@@ -28,6 +28,7 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
     Parameters
     ----------
     logged : TimeSeries
+        Forward [m/s] and yaw [rad/s], as they were recorded.
     whitened : numpy.ndarray, shape (n,)
         Innovations of the drive with these.
     wheels : numpy.ndarray of bool, shape (n,)

@@ -97,7 +97,9 @@ def likeliest_stamps(evidence: Evidence, fit: Fit) -> tuple[Evidence, Point]:
     Parameters
     ----------
     evidence : Evidence
+        With the stamps as they were logged.
     fit : Fit
+        Made under this evidence.
 
     Returns
     -------

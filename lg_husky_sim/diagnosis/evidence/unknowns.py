@@ -91,6 +91,7 @@ def delay_unknown(name: str, centre: float, deviation: float, period: float) -> 
     Parameters
     ----------
     name : str
+        Of the delay, such as ``delay_imu``.
     centre, deviation : float
         Gaussian prior of what its transport takes [s].
     period : float
@@ -205,6 +206,7 @@ def loosened(unknowns: Sequence[Unknown], jitter: Mapping[str, float]) -> tuple[
     Parameters
     ----------
     unknowns : sequence of Unknown
+        Of a fit; those that are no delays of the log stay as they are.
     jitter : mapping of str to float
         Standard deviation [s] of what each delay varies by.
 

@@ -28,6 +28,7 @@ def levelled(scores: FloatArray, speeds: FloatArray) -> FloatArray:
     Parameters
     ----------
     scores : numpy.ndarray, shape (n,)
+        In any unit; their mean square may depend on the speed.
     speeds : numpy.ndarray, shape (n,)
         Of the robot, in any unit.
 

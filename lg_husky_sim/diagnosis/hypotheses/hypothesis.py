@@ -66,7 +66,7 @@ class Hypothesis:
 
     @property
     def others(self) -> tuple[Hypothesis, ...]:
-        """The other forms of its family."""
+        """Return the other forms of its family."""
         found, first = [], self.family[-1]
         for shape in (first, *self.effect.kind.stands_for.get(first, ())):
             effect = replace(self.effect, shape=shape)
@@ -76,7 +76,7 @@ class Hypothesis:
 
     @property
     def other_sides(self) -> tuple[Hypothesis, ...]:
-        """The same on every other side that it can be on."""
+        """Return the same on every other side that it can be on."""
         return tuple(replace(_of(replace(self.effect, side=side)), onset=self.onset)
                      for side in self.effect.kind.sides if side != self.effect.side)
 
@@ -159,6 +159,7 @@ def hypotheses(structure: Structure) -> tuple[Hypothesis, ...]:
     Parameters
     ----------
     structure : Structure
+        Robot with the effects that it has already.
 
     Returns
     -------
@@ -195,6 +196,7 @@ def with_effects(plain: Point, final: Point, kept: Sequence[Hypothesis]) -> Poin
     plain : Point
         The model without effects but those of faults that are certain, which stay.
     final : Point
+        Fitted with all effects; its reading stays.
     kept : sequence of Hypothesis
         Their numbers come last.
 

@@ -78,6 +78,7 @@ def periodogram(values: FloatArray, quantity: FloatArray, step: float, count: in
     Parameters
     ----------
     values, quantity : numpy.ndarray, shape (n,)
+        At each sample: what may repeat, and over what (a time, a way or an angle).
     step : float
         Of the frequency [cycles per unit of the quantity].
     count : int
@@ -165,7 +166,9 @@ def lines(evidence: Evidence, fit: Fit) -> tuple[Line, ...]:
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fit was made.
     fit : Fit
+        What it leaves of the recordings is searched.
 
     Returns
     -------

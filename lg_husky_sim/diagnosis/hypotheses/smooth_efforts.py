@@ -185,7 +185,9 @@ def beyond_chance(evidence: Evidence, fit: Fit, projection: Projection, columns:
     Parameters
     ----------
     evidence : Evidence
+        Says which innovations lie in one block of time.
     fit : Fit
+        Whose innovations the columns may explain.
     projection : Projection
         Of the fit.
     columns : numpy.ndarray, shape (n, k)
@@ -218,7 +220,9 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fit was made.
     fit : Fit
+        What it leaves of the recordings is searched.
 
     Returns
     -------

@@ -81,7 +81,9 @@ def swings(evidence: Evidence, fit: Fit) -> tuple[Swing, ...]:
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fit was made.
     fit : Fit
+        What it leaves of the recordings is searched.
 
     Returns
     -------

@@ -35,7 +35,9 @@ def wheel_bursts(evidence: Evidence, fit: Fit, side: str) -> float:
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fit was made.
     fit : Fit
+        What it leaves of the recordings is searched.
     side : str
         'left' or 'right'.
 

@@ -40,6 +40,7 @@ def best_reading(evidence: Evidence, fit: Fit, afresh: bool = False) -> Fit:
     Parameters
     ----------
     evidence : Evidence
+        With the noise under which readings are compared.
     fit : Fit
         Of the model.
     afresh : bool
@@ -114,7 +115,9 @@ def as_late(evidence: Evidence, point: Point, name: str, more: float) -> list[Po
     Parameters
     ----------
     evidence : Evidence
+        Its drives say how long the periods of the streams are.
     point : Point
+        With the delays and windows of the log as they are taken now.
     name : str
         Of the delay of a stream.
     more : float

@@ -24,6 +24,7 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which fits are made.
     plain : Point
         The model without effects.
     final : Fit

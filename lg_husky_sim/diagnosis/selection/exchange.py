@@ -39,6 +39,7 @@ def exchanged(evidence: Evidence, plain: Point, final: Fit, rounds: Sequence[Rou
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which fits are made.
     plain : Point
         The model without effects.
     final : Fit
@@ -46,6 +47,7 @@ def exchanged(evidence: Evidence, plain: Point, final: Fit, rounds: Sequence[Rou
     rounds : sequence of Round
         Those that adopted them first.
     found : sequence of Hypothesis
+        In the order of their rounds.
 
     Returns
     -------

@@ -66,6 +66,7 @@ class Laws:
         Parameters
         ----------
         evidence : Evidence
+            Drives, and the noise under which the fits were made.
         base : Fit
             With what was found.
         others : sequence of Fit

@@ -28,7 +28,9 @@ def narrowed(evidence: Evidence, hypothesis: Hypothesis, point: Point) -> Number
     Parameters
     ----------
     evidence : Evidence
+        Drives and noise by which the effect is judged.
     hypothesis : Hypothesis
+        An effect with its free numbers and their starts.
     point : Point
         Of the base, without the effect.
 

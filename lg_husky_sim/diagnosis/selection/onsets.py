@@ -65,8 +65,11 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the base was fitted.
     base : Fit
+        Fit without the effects that are looked at.
     pool : sequence of Hypothesis
+        Effects to look at, each with every onset that the drives allow.
     seen : sequence of Look
         Without an onset, best first.
 
@@ -220,7 +223,9 @@ def refined(evidence: Evidence, base: Fit, tried: Any, attempt: Callable[..., An
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fits were made.
     base : Fit
+        Fit without the effect.
     tried : Tried
         With an onset of the coarse grid.
     attempt, numbers : callable

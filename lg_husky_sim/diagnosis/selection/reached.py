@@ -26,7 +26,9 @@ def reached_of(evidence: Evidence, fit: Fit) -> Mapping[str, FloatArray]:
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the fit was made.
     fit : Fit
+        Whose simulation of each drive is looked at.
 
     Returns
     -------
@@ -59,6 +61,7 @@ def limits_reached(hypothesis: Hypothesis, reached: Mapping[str, FloatArray]
     Parameters
     ----------
     hypothesis : Hypothesis
+        An effect; its free parameters say what they limit, if anything.
     reached : mapping of str to numpy.ndarray
         See :func:`reached_of`.
 

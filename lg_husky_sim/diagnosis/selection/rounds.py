@@ -91,7 +91,9 @@ def calibrated(evidence: Evidence, start: Point, times: int = 2) -> tuple[Eviden
     Parameters
     ----------
     evidence : Evidence
+        With the noise to begin with.
     start : Point
+        Where the first fit begins.
     times : int
         Turns.
 
@@ -133,9 +135,11 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which fits are made.
     base : Fit
         Whose cost is what gains are counted from.
     hypothesis : Hypothesis
+        What is added to the base.
     begins : sequence of (Point, mapping)
         Points of the base, with numbers of the effect.
     whole : bool
@@ -193,7 +197,9 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     evidence : Evidence
         With the noise of the base.
     base : Fit
+        Fit that a hypothesis is added to.
     pool : sequence of Hypothesis
+        Hypotheses that can be adopted.
     nominal : Point, optional
         Another point of the base's structure to begin from: the nominal one.
     laws : Laws, optional
@@ -330,8 +336,11 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which fits are made.
     base : Fit
+        Fit that hypotheses are added to.
     looks : sequence of Look
+        Hypotheses with numbers to begin with; those that promise too little are left out.
     points : sequence of Point
         Of the base, from where a fit may begin.
     further : sequence of Look

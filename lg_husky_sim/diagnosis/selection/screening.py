@@ -180,7 +180,9 @@ def gain_of(normal: FloatArray, slope: FloatArray, limits: Sequence[tuple[float,
     Parameters
     ----------
     normal : numpy.ndarray, shape (m, m)
+        Products of the projected columns with each other.
     slope : numpy.ndarray, shape (m,)
+        Products of the projected columns with the innovations.
     limits : sequence of (float, float)
         Of each coefficient, see :func:`limits_of`.
 
@@ -213,6 +215,7 @@ def settled(whitened: FloatArray, columns: FloatArray, start: FloatArray,
     columns : numpy.ndarray, shape (n, m)
         Whitened changes.
     start : numpy.ndarray, shape (m,)
+        Coefficients to begin with, inside the limits.
     limits : sequence of (float, float)
         Of each coefficient, see :func:`limits_of`.
 
@@ -249,9 +252,11 @@ def look(evidence: Evidence, fit: Fit, pool: Sequence[Hypothesis]) -> list[Look]
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the base was fitted.
     fit : Fit
         Of the base.
     pool : sequence of Hypothesis
+        Hypotheses to look at.
 
     Returns
     -------
@@ -353,7 +358,9 @@ def limits_of(hypothesis: Hypothesis, group: Sequence[Numbers]) -> list[tuple[fl
     Parameters
     ----------
     hypothesis : Hypothesis
+        The effect that the columns are changes by.
     group : sequence of mapping
+        Numbers that each column was simulated with.
 
     Returns
     -------

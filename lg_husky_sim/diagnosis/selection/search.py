@@ -74,7 +74,7 @@ class Search:
 
     @property
     def adopted(self) -> tuple[Round, ...]:
-        """The rounds whose best hypothesis was adopted."""
+        """Return the rounds whose best hypothesis was adopted."""
         return self.rounds[:len(self.found)]
 
 
@@ -151,9 +151,11 @@ def read_anew(evidence: Evidence, base: Fit, early: Sequence[Tried]
     Parameters
     ----------
     evidence : Evidence
+        Drives, and the noise under which the effects were fitted.
     base : Fit
         Without effects.
     early : sequence of Tried
+        Effects with their fits, any number.
 
     Returns
     -------

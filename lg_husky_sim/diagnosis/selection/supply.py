@@ -31,11 +31,13 @@ def likeliest_supply(drives: Sequence[Drive], names: Sequence[str], start: Point
     Parameters
     ----------
     drives : sequence of Drive
+        Their commands say which voltage is asked for.
     names : sequence of str
         Of the recordings in the order of time.
     start : Point
         The nominal model.
     pool : Threads
+        Threads to fit with.
 
     Returns
     -------

@@ -32,6 +32,7 @@ def is_near(evidence: Evidence, best: Fit, other: Fit, difference: float, gain: 
     evidence : Evidence
         Under whose noise both were fitted.
     best, other : Fit
+        Of two hypotheses, the better one first.
     difference : float
         Of their scores [nats].
     gain : float
