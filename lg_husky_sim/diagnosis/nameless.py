@@ -16,7 +16,8 @@ from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import (
     BALANCES,
     Effort,
     efforts,
-    FADING,
+    FELT,
+    RATED,
     READINGS,
 )
 from lg_husky_sim.diagnosis.hypotheses.swings import Swing, swings
@@ -139,8 +140,8 @@ def felt(rest: Sequence[Effort], free: Sequence[Missing], robot: RobotSize
                                    math.inf if BALANCES[one.balance][2] != 'none' else 0.0)
     # What a sensor feels beside what it reads is an offset that changes.
     offset = setting('least_misfelt')
-    return (tuple(e for e in rest if e.largest >= (offset if e.balance in READINGS and (
-        e.argument != READINGS[e.balance][2][0]) else least[e.balance])),
+    return (tuple(e for e in rest if e.largest >= (
+        offset if e.argument in FELT and e.balance in READINGS else least[e.balance])),
             tuple(m for m in free if largest[m.balance] >= least[m.balance]))
 
 
@@ -177,9 +178,9 @@ def described(effort: Effort) -> str:
                 'deck that tilts')
     if effort.argument in PAST:
         return f'{where} that follows {PAST[effort.argument][2]}'
-    if effort.argument in FADING:
-        rate = FADING[effort.argument].replace('_', ' ')
-        return f'{where} in proportion to {rate}, by a smooth function of the time since the start'
+    if effort.argument in RATED:
+        _, _, rate, quantity = RATED[effort.argument]
+        return f'{where} in proportion to {rate}, by a smooth function of {quantity}'
     return f'{where}, a smooth function of {effort.argument.replace("_", " ")}'
 
 

@@ -57,6 +57,21 @@ def fitted(record: Callable[..., Recording]) -> Iterator[tuple[Evidence, Fit]]:
         yield evidence, evidence.fit(start)
 
 
+@pytest.fixture(scope='module')
+def turned(record: Callable[..., Recording]) -> Iterator[tuple[Evidence, Fit]]:
+    """Return the same of a drive round and round, one way and the other."""
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    turns = [(1.0, 0.5 + 0.3 * float(np.sin(2.1 * k)), 1.4 if k % 16 < 8 else -1.4)
+             for k in range(48)]
+    drives = drives_of([record('round', plant, turns, 6)])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['round'], start, first_guess(drives), pool)
+        yield evidence, evidence.fit(start)
+
+
 def _moved(whitener: Whitener, efforts: FloatArray) -> FloatArray:
     # Innovations of efforts at the probe times, shape (n_probe, 4).
     frame, drive = whitener.frame, whitener.frame.drive
@@ -214,6 +229,76 @@ def test_a_loss_that_fades_from_each_start_is_unknown(
     assert verdict is Verdict.UNKNOWN
     assert said is not None
     assert f'{where}, by a smooth function of the time since the start' in said.statement
+
+
+@pytest.mark.parametrize(('row', 'rate', 'where'), [
+    (LEFT, 'wheel_left', 'a torque on the left wheels'),
+    (0, 'forward', 'a force on the chassis'), (1, 'yaw_rate', 'a yaw moment on the chassis')])
+def test_what_holds_for_a_while_after_a_standstill_is_unknown(
+        fitted: tuple[Evidence, Fit], row: int, rate: str, where: str) -> None:
+    """As a brake that comes off late, or ground that a robot has sunk into."""
+    evidence, fit = fitted
+    parts = []
+    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
+                                strict=True):
+        times, moved = probe_times(whitener.frame.drive), motion.column(rate, 'probe')
+        since, efforts = np.zeros(times.size), np.zeros((times.size, 4))
+        for k in range(1, times.size):
+            still = abs(moved[k]) < 0.03 or moved[k] * moved[k - 1] < 0.0
+            since[k] = 0.0 if still else since[k - 1] + times[k] - times[k - 1]
+        efforts[:, row] = -6.0 * np.sign(moved) * np.exp(-since / 0.4)
+        parts.append(_moved(whitener, efforts))
+    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert said.statement.startswith(f'No effect of the catalogue explains it; it is best '
+                                     f'described as {where} in proportion to the sense of motion, '
+                                     'by a smooth function of the time since a standstill')
+
+
+@pytest.mark.parametrize(('channel', 'column', 'of', 'size', 'words'), [
+    (Channel.YAW_RATE, 'yaw_rate', 'heading', 0.13, 'gyro in proportion to yaw, by a smooth '
+     'function of heading'),
+    (Channel.WHEEL_LEFT, 'wheel_left', 'angle_left', 0.03, 'left encoder in proportion to wheel '
+     'rate, by a smooth function of the angle of the wheel')])
+def test_a_sensor_whose_factor_depends_on_where_it_looks_is_unknown(
+        turned: tuple[Evidence, Fit], channel: Channel, column: str, of: str, size: float,
+        words: str) -> None:
+    """A compass that a gyro is mixed with, or a disc that is not centred."""
+    evidence, fit = turned
+    parts = []
+    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
+                                strict=True):
+        drive = whitener.frame.drive
+        times, where = probe_times(drive), motion.column(of, 'probe')
+        wrong = size * np.cos(where - 1.1) * motion.column(column, 'probe')
+        error = np.zeros((drive.measured.size, 1))
+        part = drive.slice_of(channel)
+        error[part, 0] = np.interp(whitener.frame.times[part], times, wrong)
+        parts.append(whitener.apply(error)[:, 0])
+    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert said.subsystem == 'sensor'
+    assert f'an error of the {words}' in said.statement
+
+
+@pytest.mark.parametrize(('row', 'rate', 'where'), [
+    (0, 'forward', 'a force on the chassis in proportion to forward'),
+    (1, 'yaw_rate', 'a yaw moment on the chassis in proportion to yaw')])
+def test_patches_of_the_floor_are_unknown(
+        turned: tuple[Evidence, Fit], row: int, rate: str, where: str) -> None:
+    """Fields of a chessboard, which are in neither coordinate alone."""
+    evidence, fit = turned
+    motion, = evidence.motions(fit.point, True)
+    x, y = (motion.column(name, 'probe') for name in ('x', 'y'))
+    efforts = np.zeros((x.size, 4))
+    here = (x - np.median(x)) * (y - np.median(y)) > 0.0
+    efforts[:, row] = np.where(here, -6.0, 6.0) * motion.column(rate, 'probe')
+    verdict, said = _said(_noisy(evidence, fit, _moved(evidence.whiteners[0], efforts)))
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    assert f'{where}, by a smooth function of the place' in said.statement
 
 
 def test_a_gyro_that_ends_at_some_rate_errs_and_no_effort_is_blamed(

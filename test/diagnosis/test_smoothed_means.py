@@ -9,13 +9,15 @@ from dataclasses import replace
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
-from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.noise import first_guess, Noise
 from lg_husky_sim.diagnosis.evidence.observation import observe, simulate
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading, wheel_lag, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of
 from lg_husky_sim.diagnosis.log_notes import reading_notes
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
+from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -24,6 +26,10 @@ from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid, solve_ivp
+
+#: A robot within the tolerances, over the model.
+OFF = {'mass': 1.05, 'yaw_inertia': 0.95, 'wheel_damping': 0.93, 'yaw_damping': 1.08,
+       'command_gain': 0.97, 'motor_resistance': 1.02}
 
 
 def angles_of(drive: Drive) -> tuple[FloatArray, FloatArray]:
@@ -109,3 +115,28 @@ def test_a_filter_of_messages_is_found_behind_their_means(
     assert found.get('wheel_smoothing') == pytest.approx(-mean / np.log(share), rel=0.1)
     assert found.get('wheel_window') == pytest.approx(mean, rel=0.1)
     assert 'behind a first-order filter of the messages of 2' in reading_notes(drives, found)[0]
+
+
+def test_exact_rates_behind_a_low_pass_are_found_as_well_as_from_there(driven: Drive) -> None:
+    """Without noise, a model that lacks friction is off by hundreds of deviations."""
+    lag, model, dry = 0.024, load_model(), Effect('coulomb_drivetrain', 'left')
+    made = Reading(WheelReading.FILTERED, values={'wheel_window': lag})
+    even = np.arange(driven.start, driven.end, 0.016)
+    exact = replace(driven, wheel_times=even, imu_times=even[:0], pose_times=even[:0],
+                    measured=np.zeros(2 * even.size), times=np.tile(even, 2), channels=np.repeat(
+                        [int(Channel.WHEEL_LEFT), int(Channel.WHEEL_RIGHT)], even.size))
+    plant = compile_model(model.structure.with_effect(dry)).at(
+        model.parameters.with_entries(*entries_of(dry, {'dry_torque': 3.2})).replacing({
+            name: share * model.parameters[name] for name, share in OFF.items()}))
+    exact = replace(exact, measured=observe(simulate(plant, exact, made), exact, made))
+    start = beginning(model.structure, base_unknowns(model.parameters, [exact]),
+                      model.parameters, Reading())
+    with Threads(1) as pool:
+        first = evidence_of([exact], ['one'], start, Noise({
+            **first_guess([exact]).values, 'wheel': 5e-6, 'wheel_jitter': 3e-5}), pool)
+        found = best_reading(first, first.fit(start, rounds=1), afresh=True)
+        there = first.fit(replace(start, reading=made), rounds=20)
+    assert found.point.log.wheels is WheelReading.FILTERED
+    assert found.point.log.get('wheel_window') == pytest.approx(lag, rel=0.1)
+    # After a few steps, of costs beyond 100,000 nats where it began.
+    assert found.cost < there.cost + 30.0

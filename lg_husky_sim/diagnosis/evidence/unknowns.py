@@ -17,8 +17,8 @@ import numpy as np
 
 #: Numbers of the model that a recalibration moves within their tolerances.
 RECALIBRATED = ('wheel_damping', 'yaw_damping', 'command_gain', 'turn_ratio', 'mass',
-                'yaw_inertia', 'wheel_inertia', 'motor_resistance', 'wheel_radius', 'track',
-                'side_gain_ratio')
+                'yaw_inertia', 'wheel_inertia', 'motor_resistance', 'motor_inductance',
+                'wheel_radius', 'track', 'side_gain_ratio')
 #: Value at which a number of an effect does nothing, where that is not zero.
 NEUTRAL = {'gyro_factor': 1.0, 'encoder_factor': 1.0}
 

@@ -13,8 +13,11 @@ effort, at the likeliest size s, is::
 
 with the variance of the innovations along C as the effort leaves them, not that of white ones. The
 errors of a gyro or an encoder as a function of what it reads, and those of a gyro that feels an
-acceleration, are looked for in the same way, and so is a loss that fades, as of grease that is
-cold at first: ``f(time since the start)`` times a rate.
+acceleration, are looked for in the same way, and so are some in proportion to a rate, ``f(q)``
+times it: losses that fade, as of grease that is cold at first, with the time since the start as q;
+losses of patches of the floor, with both coordinates, over the products of hat functions of both;
+what holds for a while after a standstill, with the time since then and the sense of the rate; and
+sensors whose factor depends on where they look, with the heading or the angle of a wheel.
 """
 
 from __future__ import annotations
@@ -45,19 +48,32 @@ BALANCES = {
 }
 #: Quantities that an effort at the chassis and one at the wheels may be a function of.
 CHASSIS = ('forward', 'yaw', 'acceleration', 'heading', 'x', 'y', 'time')
-ARGUMENTS = {'force': (*CHASSIS, 'past_forward', 'past_direction', 'fading_forward'),
-             'moment': (*CHASSIS, 'past_yaw', 'past_turn', 'fading_yaw'),
+ARGUMENTS = {'force': (*CHASSIS, 'past_forward', 'past_direction', 'fading_forward',
+                       'patches_forward', 'starting_forward'),
+             'moment': (*CHASSIS, 'past_yaw', 'past_turn', 'fading_yaw', 'patches_yaw',
+                        'starting_yaw'),
              **dict.fromkeys(('torque_left', 'torque_right'), (
                  'wheel_rate', 'angle', 'wheel_acceleration', 'time', 'past_wheel_rate',
-                 'driving_current', 'fading_wheel_rate'))}
-#: Of those that fade, the rate.
-FADING = {'fading_forward': 'forward', 'fading_yaw': 'yaw', 'fading_wheel_rate': 'wheel_rate'}
+                 'driving_current', 'fading_wheel_rate', 'starting_wheel_rate'))}
+#: Those in proportion to a rate: their quantity, the rate, and both in words.
+RATED = {
+    **{f'fading_{rate}': ('since_start', rate, f'{rate.replace("_", " ")}', (
+        'the time since the start')) for rate in ('forward', 'yaw', 'wheel_rate')},
+    **{f'patches_{rate}': ('x', rate, rate, 'the place') for rate in ('forward', 'yaw')},
+    **{f'starting_{rate}': (f'since_{rate}', f'sense_{rate}', 'the sense of motion', (
+        'the time since a standstill')) for rate in ('forward', 'yaw', 'wheel_rate')},
+    'heading_yaw': ('heading', 'yaw', 'yaw', 'heading'),
+    'angle_wheel_rate': ('angle', 'wheel_rate', 'wheel rate', 'the angle of the wheel'),
+}
 #: The same of readings, whose errors may follow what they are readings of, or what a sensor feels
-#: beside it: channels, side, and the quantities of each.
+#: beside it (the first tuple): channels, side, and the quantities of each.
+FELT = ('acceleration', 'lateral_acceleration')
 READINGS = {
-    'gyro': ((Channel.YAW_RATE,), 'none', ('yaw', 'acceleration', 'lateral_acceleration')),
-    'encoder_left': ((Channel.WHEEL_LEFT, Channel.ANGLE_LEFT), 'left', ('wheel_rate',)),
-    'encoder_right': ((Channel.WHEEL_RIGHT, Channel.ANGLE_RIGHT), 'right', ('wheel_rate',)),
+    'gyro': ((Channel.YAW_RATE,), 'none', ('yaw', *FELT, 'heading_yaw')),
+    'encoder_left': ((Channel.WHEEL_LEFT, Channel.ANGLE_LEFT), 'left', (
+        'wheel_rate', 'angle_wheel_rate')),
+    'encoder_right': ((Channel.WHEEL_RIGHT, Channel.ANGLE_RIGHT), 'right', (
+        'wheel_rate', 'angle_wheel_rate')),
 }
 
 
@@ -120,6 +136,8 @@ def quantities(evidence: Evidence, motions: Sequence[Motion]) -> list[dict[str, 
                'x': motion.column('x', 'probe'), 'y': motion.column('y', 'probe'),
                'time': before + times - drive.start, 'lateral_acceleration': forward * yaw,
                'since_start': times - begun.setdefault(drive.recording, drive.start)}
+        for name, rate in (('forward', forward), ('yaw', yaw)):
+            one |= started(times, rate, name, setting(f'turning_{name}'))
         before += drive.end - drive.start
         if drive.pose_times.size:
             one['heading'] = np.mod(np.interp(times, drive.pose_times, drive.heading),
@@ -130,13 +148,42 @@ def quantities(evidence: Evidence, motions: Sequence[Motion]) -> list[dict[str, 
         for side in ('left', 'right'):
             rate = motion.column(f'wheel_{side}', 'probe')
             one[f'wheel_rate_{side}'] = rate
-            sense = np.clip(rate / setting('turning_wheel'), -1.0, 1.0)
-            one[f'sense_{side}'] = sense
+            one |= started(times, rate, f'wheel_rate_{side}', setting('turning_wheel'))
+            sense = one[f'sense_wheel_rate_{side}']
             one[f'driving_current_{side}'] = sense * motion.column(f'current_{side}', 'probe')
             one[f'wheel_acceleration_{side}'] = np.gradient(rate, times)
             one[f'angle_{side}'] = np.mod(motion.column(f'angle_{side}', 'probe'), 2.0 * np.pi)
         found.append(one)
     return found
+
+
+def started(times: FloatArray, rate: FloatArray, name: str, least: float
+            ) -> dict[str, FloatArray]:
+    """
+    Return the sense of a rate and the time since it was none.
+
+    Parameters
+    ----------
+    times, rate : numpy.ndarray, shape (n,)
+        [s], [rate]
+    name : str
+        Of the rate.
+    least : float
+        Rate from which the sense is certain; half of it, or a change of the sense, is a standstill
+        [rate].
+
+    Returns
+    -------
+    dict of str to numpy.ndarray, shape (n,)
+        ``sense_<name>``, from -1 to 1, and ``since_<name>`` [s], at most `longest_past`.
+
+    """
+    still = np.abs(rate) < 0.5 * least
+    still[1:] |= rate[1:] * rate[:-1] < 0.0
+    longest = setting('longest_past')
+    last = np.maximum.accumulate(np.where(still, times, times[0] - longest))
+    return {f'sense_{name}': np.clip(rate / least, -1.0, 1.0),
+            f'since_{name}': np.minimum(times - last, longest)}
 
 
 def log_evidence(normal: FloatArray, slope: FloatArray) -> tuple[float, FloatArray, FloatArray]:
@@ -234,35 +281,41 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     known = quantities(evidence, motions)
     projection = Projection(fit)
     count = int(setting('smooth_knots'))
+    floor = tuple((float(min(np.min(one[name]) for one in known)),
+                   float(max(np.max(one[name]) for one in known))) for name in ('x', 'y'))
 
     def one_of(task: tuple[str, str]) -> Effort | None:
         balance, argument = task
         side = READINGS[balance][1] if balance in READINGS else BALANCES[balance][2]
-        rate = FADING.get(argument)
-        quantity = PAST[argument][0] if argument in PAST else (
-            'since_start' if rate else argument)
+        quantity, rate = PAST[argument][0] if argument in PAST else argument, ''
+        if argument in RATED:
+            quantity, rate = RATED[argument][:2]
         name = quantity if side == 'none' or quantity in (
             'time', 'since_start') else f'{quantity}_{side}'
         pooled = np.concatenate([one[name] for one in known])
-        low, high = (0.0, 2.0 * np.pi) if argument in ('heading', 'angle') else (
+        low, high = (0.0, 2.0 * np.pi) if quantity in ('heading', 'angle') else (
             float(np.min(pooled)), float(np.max(pooled)))
         parts, shapes = [], []
         for one, whitener in zip(known, evidence.whiteners, strict=True):
             shape = responses(
                 one[name], probe_times(whitener.frame.drive), argument, count
-            ) if argument in PAST else hats(one[name], low, high, count)
+            ) if argument in PAST else patches(one['x'], one['y'], floor) if (
+                argument.startswith('patches')) else hats(one[name], low, high, count)
             if rate:
                 shape *= one[rate if side == 'none' else f'{rate}_{side}'][:, None]
             if argument == 'driving_current':
                 # What helps forwards helps backwards.
-                shape *= one[f'sense_{side}'][:, None]
+                shape *= one[f'sense_wheel_rate_{side}'][:, None]
             shapes.append(shape)
             parts.append(whitener.apply(
                 _misread(whitener, balance, shape) if balance in READINGS else
                 moved_by(whitener, BALANCES[balance][0], shape)))
         columns = np.concatenate(parts)
-        if not np.any(columns):
+        # Nothing is known of knots where no drive has been.
+        seen = np.any(columns, axis=0)
+        if not np.any(seen):
             return None
+        columns, shapes = columns[:, seen], [shape[:, seen] for shape in shapes]
         gain, explained, values, deviations = beyond_chance(evidence, fit, projection, columns)
         largest = max(float(np.max(np.abs(shape @ values))) for shape in shapes)
         return Effort(balance, argument, gain, explained, low, high, values, deviations, largest)
@@ -270,6 +323,28 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
              *((b, argument) for b, (*_, own) in READINGS.items() for argument in own)]
     found = [one for one in evidence.pool.map(one_of, tasks) if one is not None]
     return tuple(sorted(found, key=lambda e: -e.evidence))
+
+
+def patches(x: FloatArray, y: FloatArray, floor: Sequence[tuple[float, float]]) -> FloatArray:
+    """
+    Return products of hat functions of both coordinates.
+
+    Parameters
+    ----------
+    x, y : numpy.ndarray, shape (n,)
+        [m]
+    floor : sequence of (float, float)
+        Ranges of both [m].
+
+    Returns
+    -------
+    numpy.ndarray, shape (n, k * k)
+
+    """
+    count = int(setting('patch_knots'))
+    across = hats(x, *floor[0], count), hats(y, *floor[1], count)
+    found: FloatArray = np.einsum('ni,nj->nij', *across).reshape(x.size, count * count)
+    return found
 
 
 def moved_by(whitener: Whitener, row: int, shape: FloatArray) -> FloatArray:

@@ -63,22 +63,24 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
         return fit
     # All by as many steps: what the same reading gains by them is not due to another one.
     rounds = int(setting('reading_rounds'))
-    begins = [fit]
+    begins = [(fit, 1.0)]
     if afresh or is_distorted(fit):
         # One step takes the derivatives there; a model with an effect that only other numbers can
         # bear runs away there, and does not begin there.
-        start = nominal_of(fit.point)
         with suppress(ParameterError):
-            begins.append(replace(evidence.fit(start, rounds=1), point=start))
-    chosen: list[tuple[Point, Fit]] = []
-    for begin in begins:
+            begins.append(_begun_at(evidence, nominal_of(fit.point)))
+    chosen: list[tuple[Point, Fit, float]] = []
+    for begin, inflation in begins:
         points = [_read_so(evidence, begin.point, one) for one in options]
-        promised = evidence.pool.map(_promise_of(evidence, begin), points)
+        promised = evidence.pool.map(_promise_of(evidence, begin, inflation), points)
         order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
-        chosen += [(points[place], begin) for place in order]
-    tried = evidence.pool.map(
-        lambda one: evidence.fit(one[0], one[1].slopes, rounds=rounds), chosen)
-    best = min(tried, key=lambda one: one.cost, default=fit)
+        chosen += [(points[place], begin, inflation) for place in order]
+
+    def fitted(one: tuple[Point, Fit, float]) -> Fit:
+        point, begin, inflation = one
+        found = evidence.fit(point, begin.slopes, rounds=rounds, inflation=inflation)
+        return found if inflation == 1.0 else evidence.fit(found.point, rounds=rounds)
+    best = min(evidence.pool.map(fitted, chosen), key=lambda one: one.cost, default=fit)
     same = min(fit, evidence.fit(fit.point, rounds=rounds), key=lambda one: one.cost)
     if best.cost > same.cost - setting('reading_gain'):
         return fit if same.cost > fit.cost - setting('reading_gain') else same
@@ -91,6 +93,14 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
                     places=np.append(best.point.places, start_of(more)))
     slopes = [np.hstack([one, np.zeros((one.shape[0], len(more)))]) for one in best.slopes]
     return evidence.fit(wider, slopes, rounds=3, renew=range(known, known + len(more)))
+
+
+def _begun_at(evidence: Evidence, start: Point) -> tuple[Fit, float]:
+    # Where a model is off by many deviations of small noise, neither one step nor the prior says
+    # anything: noise as large as what is left there makes both count.
+    left = evidence.residuals(evidence.predict(start))
+    inflation = max(1.0, float(np.sqrt(np.mean(left ** 2))))
+    return replace(evidence.fit(start, rounds=1, inflation=inflation), point=start), inflation
 
 
 def _unread(evidence: Evidence, point: Point) -> list[Unknown]:
@@ -173,10 +183,10 @@ def read_like(point: Point, other: Point) -> Point:
         known.get(u.name, place) for u, place in zip(unknowns, places, strict=True)]))
 
 
-def _promise_of(evidence: Evidence, fit: Fit) -> Callable[[Point], float]:
+def _promise_of(evidence: Evidence, fit: Fit, inflation: float) -> Callable[[Point], float]:
     # What a fit would cost after one step from a point, with the derivatives of this one.
     def promise(point: Point) -> float:
-        e = evidence.residuals(evidence.predict(point))
+        e = evidence.residuals(evidence.predict(point)) / inflation
         weight = student.weights(e)
         normal = normal_matrix(fit.jacobian, weight) + np.diag(point.weights ** 2)
         slope = fit.jacobian.T @ (weight * e) - point.weights * point.prior_residuals
