@@ -59,6 +59,30 @@ def test_looks_go_on_below_the_weakest_size(base: tuple[Evidence, Fit]) -> None:
     assert found[0].gain > 20.0
 
 
+def test_a_number_at_its_bound_takes_nothing_from_a_look(
+        record: Callable[..., Recording], steps: Sequence[tuple[float, float, float]]) -> None:
+    """What a gyro's factor may be without being called wrong is not all of this one."""
+    model = load_model()
+    plant = compile_model(model.structure).at(model.parameters)
+    whole = record('ahead', plant, steps, 3)
+    imu = whole.streams['imu']
+    scaled = imu.values * np.array([0.95 if name == 'yaw_rate' else 1.0 for name in imu.names])
+    drives = drives_of([replace(whole, streams={**whole.streams, 'imu': TimeSeries(
+        imu.times, scaled, imu.names)})])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    gain = next(k for k, u in enumerate(start.unknowns) if u.name == 'gyro_gain')
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        fit = evidence.fit(start)
+        assert fit.point.places[gain] == start.unknowns[gain].lower
+        own = [h for h in hypotheses(start.structure) if h.effect.id == 'gyro_scale']
+        promised, = look(evidence, fit, own)
+        found = attempt(evidence, fit, own[0], [(fit.point, promised.numbers)])
+    assert found is not None
+    assert promised.gain > 0.5 * found.gain > 50.0
+
+
 def test_a_limit_that_acts_for_moments_is_seen(record: Callable[..., Recording]) -> None:
     # Its errors are many times the noise and weigh next to nothing; the next stronger size from
     # which a look begins clips nearly all the time.

@@ -1,11 +1,12 @@
 # Copyright 2026 lg_husky_sim contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A Gauss-Newton step inside bounds."""
+"""A Gauss-Newton step inside bounds, and which numbers they keep from moving."""
 
 from __future__ import annotations
 
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 
 def step_inside(normal: FloatArray, slope: FloatArray, low: FloatArray, high: FloatArray
@@ -41,3 +42,27 @@ def step_inside(normal: FloatArray, slope: FloatArray, low: FloatArray, high: Fl
             rest = slope[free] - normal[np.ix_(free, ~free)] @ move[~free]
             move[free] = np.linalg.solve(normal[np.ix_(free, free)], rest)
     return move
+
+
+def held(places: FloatArray, slope: FloatArray, low: FloatArray, high: FloatArray
+         ) -> NDArray[np.bool_]:
+    """
+    Return which numbers are at a bound that they would cross.
+
+    Parameters
+    ----------
+    places : numpy.ndarray, shape (k,)
+        Inside the bounds.
+    slope : numpy.ndarray, shape (k,)
+        Down the cost.
+    low, high : numpy.ndarray, shape (k,)
+        Bounds of each place.
+
+    Returns
+    -------
+    numpy.ndarray of bool, shape (k,)
+
+    """
+    found: NDArray[np.bool_] = ((places <= low) & (slope < 0.0)) | (
+        (places >= high) & (slope > 0.0))
+    return found

@@ -70,6 +70,12 @@ class Fit:
     slopes: tuple[FloatArray, ...]
     predicted: tuple[FloatArray, ...]
 
+    @property
+    def descent(self) -> FloatArray:
+        """Where the cost falls: less its gradient by the places, shape (k,)."""
+        pulled: FloatArray = self.jacobian.T @ (student.weights(self.whitened) * self.whitened)
+        return pulled - self.point.weights * self.point.prior_residuals
+
 
 class Evidence:
     """

@@ -38,7 +38,8 @@ import numpy as np
 
 #: Quantities that a law may depend on otherwise than it says.
 ARGUMENTS = ('forward', 'yaw', 'acceleration', 'time', *(
-    f'{name}_{side}' for name in ('wheel_rate', 'sense', 'wheel_acceleration', 'driving_current')
+    f'{name}_{side}' for name in (
+        'wheel_rate', 'sense_wheel_rate', 'wheel_acceleration', 'driving_current')
     for side in ('left', 'right')))
 
 

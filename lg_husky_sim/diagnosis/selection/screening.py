@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import math
 
 from lg_husky_sim.diagnosis.evidence import student
+from lg_husky_sim.diagnosis.evidence.bounded_step import held
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.products import normal_matrix, row_slices
 from lg_husky_sim.diagnosis.evidence.unknowns import NEUTRAL
@@ -68,7 +69,8 @@ class Projection:
     Parameters
     ----------
     fit : Fit
-        Of the base.
+        Of the base. Numbers that a bound keeps from moving on do not move: what they cannot take
+        is left.
 
     """
 
@@ -76,7 +78,7 @@ class Projection:
         count = fit.whitened.size
         root = np.sqrt(student.weights(fit.whitened))
         stacked = np.vstack([fit.jacobian * root[:, None], np.diag(fit.point.weights)])
-        base, _ = np.linalg.qr(stacked)
+        base, _ = np.linalg.qr(stacked[:, ~held(fit.point.places, fit.descent, *fit.point.bounds)])
         target = np.concatenate([root * fit.whitened, -fit.point.prior_residuals])
         target -= base @ (base.T @ target)
         self._weights = root * root
