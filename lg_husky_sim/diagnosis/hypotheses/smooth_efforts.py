@@ -136,8 +136,8 @@ def quantities(evidence: Evidence, motions: Sequence[Motion]) -> list[dict[str, 
                'x': motion.column('x', 'probe'), 'y': motion.column('y', 'probe'),
                'time': before + times - drive.start, 'lateral_acceleration': forward * yaw,
                'since_start': times - begun.setdefault(drive.recording, drive.start)}
-        for name, rate in (('forward', forward), ('yaw', yaw)):
-            one |= started(times, rate, name, setting(f'turning_{name}'))
+        one |= started(times, forward, 'forward', setting('turning_forward'))
+        one |= started(times, yaw, 'yaw', setting('turning_yaw'))
         before += drive.end - drive.start
         if drive.pose_times.size:
             one['heading'] = np.mod(np.interp(times, drive.pose_times, drive.heading),
