@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from lg_husky_sim.diagnosis.conclusion import answer
@@ -12,7 +12,7 @@ from lg_husky_sim.diagnosis.evidence.adjoint import scores
 from lg_husky_sim.diagnosis.evidence.drives import Channel, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess, Whitener
-from lg_husky_sim.diagnosis.evidence.observation import probe_times
+from lg_husky_sim.diagnosis.evidence.observation import Motion, probe_times
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
@@ -43,18 +43,23 @@ STEPS = [(STEP, 0.2 + 0.7 * float(np.sin(1.7 * k)), 0.6 * float(np.sin(2.9 * k))
          for k in range(24)]
 
 
+def _fit_of(recordings: Sequence[Recording], pool: Threads) -> tuple[Evidence, Fit]:
+    drives, model = drives_of(recordings), load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    evidence = evidence_of(drives, [r.name for r in recordings], start, first_guess(drives), pool)
+    return evidence, evidence.fit(start)
+
+
 @pytest.fixture(scope='module')
 def fitted(record: Callable[..., Recording]) -> Iterator[tuple[Evidence, Fit]]:
     """Return the evidence of two drives of a robot that lacks nothing, and their fit."""
     model = load_model()
     plant = compile_model(model.structure).at(model.parameters)
     backwards = [(duration, -forward, -yaw) for duration, forward, yaw in STEPS[::-1]]
-    drives = drives_of([record('ahead', plant, STEPS, 4), record('back', plant, backwards, 5)])
-    start = beginning(model.structure, base_unknowns(model.parameters, drives),
-                      model.parameters, Reading())
     with Threads(1) as pool:
-        evidence = evidence_of(drives, ['ahead', 'back'], start, first_guess(drives), pool)
-        yield evidence, evidence.fit(start)
+        yield _fit_of([record('ahead', plant, STEPS, 4), record('back', plant, backwards, 5)],
+                      pool)
 
 
 @pytest.fixture(scope='module')
@@ -64,12 +69,12 @@ def turned(record: Callable[..., Recording]) -> Iterator[tuple[Evidence, Fit]]:
     plant = compile_model(model.structure).at(model.parameters)
     turns = [(1.0, 0.5 + 0.3 * float(np.sin(2.1 * k)), 1.4 if k % 16 < 8 else -1.4)
              for k in range(48)]
-    drives = drives_of([record('round', plant, turns, 6)])
-    start = beginning(model.structure, base_unknowns(model.parameters, drives),
-                      model.parameters, Reading())
     with Threads(1) as pool:
-        evidence = evidence_of(drives, ['round'], start, first_guess(drives), pool)
-        yield evidence, evidence.fit(start)
+        yield _fit_of([record('round', plant, turns, 6)], pool)
+
+
+def _each(evidence: Evidence, fit: Fit) -> Iterator[tuple[Whitener, Motion]]:
+    return zip(evidence.whiteners, evidence.motions(fit.point, True), strict=True)
 
 
 def _moved(whitener: Whitener, efforts: FloatArray) -> FloatArray:
@@ -95,6 +100,13 @@ def _said(search: Search) -> tuple[Verdict, Finding | None]:
     free = missing_efforts(search.evidence, search.final)
     verdict = answer(search, rest, free).verdict
     return verdict, unknown_finding(search, rest, free) if verdict is Verdict.UNKNOWN else None
+
+
+def _unknown(search: Search) -> Finding:
+    verdict, said = _said(search)
+    assert verdict is Verdict.UNKNOWN
+    assert said is not None
+    return said
 
 
 def test_scores_of_efforts_are_products_with_their_innovations(
@@ -137,8 +149,7 @@ def test_what_repeats_is_unknown_and_says_over_what(
         fitted: tuple[Evidence, Fit], quantity: str, period: float, words: str) -> None:
     evidence, fit = fitted
     parts = []
-    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
-                                strict=True):
+    for whitener, motion in _each(evidence, fit):
         efforts = np.zeros((probe_times(whitener.frame.drive).size, 4))
         efforts[:, LEFT] = 2.0 * np.cos(2.0 * np.pi / period * motion.column(quantity, 'probe'))
         parts.append(_moved(whitener, efforts))
@@ -148,9 +159,7 @@ def test_what_repeats_is_unknown_and_says_over_what(
     assert found[0].period == pytest.approx(period, rel=0.03)
     # A period that is a little off goes out of phase.
     assert 1.0 < found[0].largest < 2.5
-    verdict, said = _said(search)
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
+    said = _unknown(search)
     assert (said.subsystem, said.side) == ('drivetrain', 'left')
     assert words in said.statement
 
@@ -161,8 +170,7 @@ def test_a_deck_that_tilts_to_and_fro_is_unknown_and_says_how_fast(
     """In whatever direction; the force counted as noise of the floor, and nothing was missing."""
     evidence, fit = fitted
     size, parts = 12.0, []
-    for phase, (whitener, motion) in enumerate(zip(
-            evidence.whiteners, evidence.motions(fit.point, True), strict=True)):
+    for phase, (whitener, motion) in enumerate(_each(evidence, fit)):
         times, heading = probe_times(whitener.frame.drive), motion.column('heading', 'probe')
         efforts = np.zeros((times.size, 4))
         efforts[:, 0] = size * np.cos(heading - way) * np.sin(
@@ -173,9 +181,7 @@ def test_a_deck_that_tilts_to_and_fro_is_unknown_and_says_how_fast(
     assert found.period == pytest.approx(period, rel=0.08)
     # Part of a slow one is taken for the noise that it is like.
     assert 0.3 * size < found.largest < 1.5 * size
-    verdict, said = _said(search)
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
+    said = _unknown(search)
     assert said.subsystem == 'translation'
     assert 'a force on the chassis that swings every' in said.statement
 
@@ -195,8 +201,7 @@ def test_a_gyro_that_feels_acceleration_errs(fitted: tuple[Evidence, Fit], quant
     """As the g-sensitivity of one; a damping and a radius had been named for it."""
     evidence, fit = fitted
     parts = []
-    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
-                                strict=True):
+    for whitener, motion in _each(evidence, fit):
         drive, times = whitener.frame.drive, probe_times(whitener.frame.drive)
         forward, yaw = (motion.column(name, 'probe') for name in ('forward', 'yaw_rate'))
         felt = np.gradient(forward, times) if quantity == 'acceleration' else forward * yaw
@@ -204,9 +209,7 @@ def test_a_gyro_that_feels_acceleration_errs(fitted: tuple[Evidence, Fit], quant
         part = drive.slice_of(Channel.YAW_RATE)
         out[part, 0] = size * np.interp(drive.times[part], times, felt)
         parts.append(whitener.apply(out)[:, 0])
-    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
+    said = _unknown(_noisy(evidence, fit, np.concatenate(parts)))
     assert said.subsystem == 'sensor'
     assert f'an error of the gyro, a smooth function of {quantity}' in said.statement
 
@@ -219,15 +222,12 @@ def test_a_loss_that_fades_from_each_start_is_unknown(
     """As of cold grease, in either direction; a payload had been named for it."""
     evidence, fit = fitted
     parts = []
-    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
-                                strict=True):
+    for whitener, motion in _each(evidence, fit):
         times = probe_times(whitener.frame.drive)
         efforts = np.zeros((times.size, 4))
         efforts[:, row] = -3.0 * np.exp(-(times - times[0]) / 6.0) * motion.column(rate, 'probe')
         parts.append(_moved(whitener, efforts))
-    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
+    said = _unknown(_noisy(evidence, fit, np.concatenate(parts)))
     assert f'{where}, by a smooth function of the time since the start' in said.statement
 
 
@@ -239,8 +239,7 @@ def test_what_holds_for_a_while_after_a_standstill_is_unknown(
     """As a brake that comes off late, or ground that a robot has sunk into."""
     evidence, fit = fitted
     parts = []
-    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
-                                strict=True):
+    for whitener, motion in _each(evidence, fit):
         times, moved = probe_times(whitener.frame.drive), motion.column(rate, 'probe')
         since, efforts = np.zeros(times.size), np.zeros((times.size, 4))
         for k in range(1, times.size):
@@ -248,12 +247,9 @@ def test_what_holds_for_a_while_after_a_standstill_is_unknown(
             since[k] = 0.0 if still else since[k - 1] + times[k] - times[k - 1]
         efforts[:, row] = -6.0 * np.sign(moved) * np.exp(-since / 0.4)
         parts.append(_moved(whitener, efforts))
-    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
-    assert said.statement.startswith(f'No effect of the catalogue explains it; it is best '
-                                     f'described as {where} in proportion to the sense of motion, '
-                                     'by a smooth function of the time since a standstill')
+    said = _unknown(_noisy(evidence, fit, np.concatenate(parts)))
+    assert (f'{where} in proportion to the sense of motion, by a smooth function of the time '
+            'since a standstill') in said.statement
 
 
 @pytest.mark.parametrize(('channel', 'column', 'of', 'size', 'words'), [
@@ -267,8 +263,7 @@ def test_a_sensor_whose_factor_depends_on_where_it_looks_is_unknown(
     """A compass that a gyro is mixed with, or a disc that is not centred."""
     evidence, fit = turned
     parts = []
-    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
-                                strict=True):
+    for whitener, motion in _each(evidence, fit):
         drive = whitener.frame.drive
         times, where = probe_times(drive), motion.column(of, 'probe')
         wrong = size * np.cos(where - 1.1) * motion.column(column, 'probe')
@@ -276,9 +271,7 @@ def test_a_sensor_whose_factor_depends_on_where_it_looks_is_unknown(
         part = drive.slice_of(channel)
         error[part, 0] = np.interp(whitener.frame.times[part], times, wrong)
         parts.append(whitener.apply(error)[:, 0])
-    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
+    said = _unknown(_noisy(evidence, fit, np.concatenate(parts)))
     assert said.subsystem == 'sensor'
     assert f'an error of the {words}' in said.statement
 
@@ -295,9 +288,7 @@ def test_patches_of_the_floor_are_unknown(
     efforts = np.zeros((x.size, 4))
     here = (x - np.median(x)) * (y - np.median(y)) > 0.0
     efforts[:, row] = np.where(here, -6.0, 6.0) * motion.column(rate, 'probe')
-    verdict, said = _said(_noisy(evidence, fit, _moved(evidence.whiteners[0], efforts)))
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
+    said = _unknown(_noisy(evidence, fit, _moved(evidence.whiteners[0], efforts)))
     assert f'{where}, by a smooth function of the place' in said.statement
 
 
@@ -305,8 +296,7 @@ def test_a_gyro_that_ends_at_some_rate_errs_and_no_effort_is_blamed(
         fitted: tuple[Evidence, Fit]) -> None:
     evidence, fit = fitted
     parts = []
-    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
-                                strict=True):
+    for whitener, motion in _each(evidence, fit):
         drive = whitener.frame.drive
         yaw = np.interp(whitener.frame.times, probe_times(drive),
                         motion.column('yaw_rate', 'probe'))
@@ -314,9 +304,7 @@ def test_a_gyro_that_ends_at_some_rate_errs_and_no_effort_is_blamed(
         part = drive.slice_of(Channel.YAW_RATE)
         error[part, 0] = (np.clip(yaw, -0.3, 0.3) - yaw)[part]
         parts.append(whitener.apply(error)[:, 0])
-    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
+    said = _unknown(_noisy(evidence, fit, np.concatenate(parts)))
     assert said.subsystem == 'sensor'
     assert 'error of the gyro, a smooth function of yaw' in said.statement
 
@@ -325,15 +313,12 @@ def test_a_motor_that_brakes_less_than_it_drives_is_unknown_and_says_so(
         fitted: tuple[Evidence, Fit]) -> None:
     evidence, fit = fitted
     parts = []
-    for whitener, motion in zip(evidence.whiteners, evidence.motions(fit.point, True),
-                                strict=True):
+    for whitener, motion in _each(evidence, fit):
         rate, current = (motion.column(f'{name}_left', 'probe') for name in ('wheel', 'current'))
         efforts = np.zeros((probe_times(whitener.frame.drive).size, 4))
         efforts[:, LEFT] = np.where(rate * current < 0.0, -1.0 * current, 0.0)
         parts.append(_moved(whitener, efforts))
-    verdict, said = _said(_noisy(evidence, fit, np.concatenate(parts)))
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
+    said = _unknown(_noisy(evidence, fit, np.concatenate(parts)))
     assert said.regime == 'driving current'
     assert (said.subsystem, said.side) == ('drivetrain', 'left')
 
@@ -356,9 +341,7 @@ def test_a_motor_that_drops_out_while_no_command_changes_is_unknown(
     evidence, fit = fitted
     search = _with_pulses(evidence, fit, tuple(k * STEP + 0.85 for k in (3, 8, 14, 20)), 0.15)
     assert wheel_bursts(evidence, search.final, 'right') == 0.0
-    verdict, said = _said(search)
-    assert verdict is Verdict.UNKNOWN
-    assert said is not None
+    said = _unknown(search)
     assert (said.subsystem, said.side) == ('drivetrain', 'left')
     assert 'a torque on the left wheels at scattered times' in said.statement
 
