@@ -157,7 +157,9 @@ def test_the_readme_counts_what_the_outcomes_of_all_trials_and_exams_say() -> No
     exams = sorted(DOCS.glob('proof_exam*.jsonl'))
     asked = {'named': 'single effects: named right', 'changed': 'what changed: named right',
              'flagged': 'clean robots: named, called unknown or failed (false alarm)',
-             'unchanged': 'what changed: an unchanged robot flagged'}
+             'unchanged': 'what changed: an unchanged robot flagged',
+             'outside': 'outside the catalogue: unknown, or part right'}
+    three = [DOCS / f'{name}.jsonl' for name in OUTCOMES if name.startswith('proof_exam')][-3:]
 
     def counted(files: list[Path], question: str) -> str:
         found = rates([judge(row) for path in files for row in outcomes.read(path)[1]])
@@ -169,7 +171,10 @@ def test_the_readme_counts_what_the_outcomes_of_all_trials_and_exams_say() -> No
             f'named {counted(trials, "named")} single effects ({counted(last, "named")} in the',
             f'alarms on {counted(trials, "flagged")} clean robots ({counted(last, "flagged")})',
             f'it named {counted(last, "changed")} in the last one',
-            f'named {counted(exams, "named")} single effects and {counted(exams, "changed")} ch',
-            f'alarms on {counted(exams, "flagged")} clean robots',
+            f'named {counted(exams, "named")} single effects and {counted(exams, "changed")} '
+            f'changes ({counted(three[-1:], "named")} effects',
+            f'effects and {counted(three[-1:], "changed")} changes in the last exam)',
+            f'alarms on {counted(exams, "flagged")} clean robots ({counted(three, "flagged")} in',
+            f'outside the catalogue it saw {counted(three, "outside")} in the last three',
             f'called {counted(exams, "unchanged")} unchanged robots changed'):
         assert claim in text

@@ -118,7 +118,7 @@ def test_a_filter_of_messages_is_found_behind_their_means(
 
 
 def test_exact_rates_behind_a_low_pass_are_found_as_well_as_from_there(driven: Drive) -> None:
-    """Without noise, a model that lacks friction is off by hundreds of deviations."""
+    """Without noise, a model that lacks friction is off by many deviations."""
     lag, model, dry = 0.024, load_model(), Effect('coulomb_drivetrain', 'left')
     made = Reading(WheelReading.FILTERED, values={'wheel_window': lag})
     even = np.arange(driven.start, driven.end, 0.016)

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -17,4 +19,14 @@ def hats(values: FloatArray, low: float, high: float, count: int) -> FloatArray:
     rows = np.arange(values.size)
     found[rows, left] = 1.0 - share
     found[rows, left + 1] = share
+    return found
+
+
+def products_of_hats(values: Sequence[FloatArray], ranges: Sequence[tuple[float, float]],
+                     count: int) -> FloatArray:
+    """Return products of hat functions of d quantities, each over its range, (n, count^d)."""
+    found = np.ones((values[0].size, 1))
+    for one, (low, high) in zip(values, ranges, strict=True):
+        own = hats(one, low, high, count)
+        found = (found[:, :, None] * own[:, None, :]).reshape(one.size, -1)
     return found

@@ -31,7 +31,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.noise import Whitener
 from lg_husky_sim.diagnosis.evidence.observation import Motion, probe_times
 from lg_husky_sim.diagnosis.evidence.whitener import respond
-from lg_husky_sim.diagnosis.hypotheses.hat_functions import hats
+from lg_husky_sim.diagnosis.hypotheses.hat_functions import products_of_hats
 from lg_husky_sim.diagnosis.hypotheses.past_motion import PAST, responses
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.settings import setting
@@ -55,19 +55,23 @@ ARGUMENTS = {'force': (*CHASSIS, 'past_forward', 'past_direction', 'fading_forwa
              **dict.fromkeys(('torque_left', 'torque_right'), (
                  'wheel_rate', 'angle', 'wheel_acceleration', 'time', 'past_wheel_rate',
                  'driving_current', 'fading_wheel_rate', 'starting_wheel_rate'))}
-#: Those in proportion to a rate: their quantity, the rate, and both in words.
-RATED = {
-    **{f'fading_{rate}': ('since_start', rate, f'{rate.replace("_", " ")}', (
+#: Those in proportion to a rate: their quantities, the rate, and both in words.
+RATED: dict[str, tuple[tuple[str, ...], str, str, str]] = {
+    **{f'fading_{rate}': (('since_start',), rate, rate.replace('_', ' '), (
         'the time since the start')) for rate in ('forward', 'yaw', 'wheel_rate')},
-    **{f'patches_{rate}': ('x', rate, rate, 'the place') for rate in ('forward', 'yaw')},
-    **{f'starting_{rate}': (f'since_{rate}', f'sense_{rate}', 'the sense of motion', (
+    **{f'patches_{rate}': (('x', 'y'), rate, rate, 'the place') for rate in ('forward', 'yaw')},
+    **{f'starting_{rate}': ((f'since_{rate}',), f'sense_{rate}', 'the sense of motion', (
         'the time since a standstill')) for rate in ('forward', 'yaw', 'wheel_rate')},
-    'heading_yaw': ('heading', 'yaw', 'yaw', 'heading'),
-    'angle_wheel_rate': ('angle', 'wheel_rate', 'wheel rate', 'the angle of the wheel'),
+    # What helps forwards helps backwards.
+    'driving_current': (('driving_current',), 'sense_wheel_rate', 'the sense of motion', (
+        'driving current')),
+    'heading_yaw': (('heading',), 'yaw', 'yaw', 'heading'),
+    'angle_wheel_rate': (('angle',), 'wheel_rate', 'wheel rate', 'the angle of the wheel'),
 }
-#: The same of readings, whose errors may follow what they are readings of, or what a sensor feels
-#: beside it (the first tuple): channels, side, and the quantities of each.
+#: What a gyro may feel beside what it reads.
 FELT = ('acceleration', 'lateral_acceleration')
+#: The same of readings, whose errors may follow what they are readings of, or what a sensor feels
+#: beside it: channels, side, and the quantities of each.
 READINGS = {
     'gyro': ((Channel.YAW_RATE,), 'none', ('yaw', *FELT, 'heading_yaw')),
     'encoder_left': ((Channel.WHEEL_LEFT, Channel.ANGLE_LEFT), 'left', (
@@ -75,6 +79,10 @@ READINGS = {
     'encoder_right': ((Channel.WHEEL_RIGHT, Channel.ANGLE_RIGHT), 'right', (
         'wheel_rate', 'angle_wheel_rate')),
 }
+#: Quantities that have no side.
+_COMMON = ('time', 'since_start')
+#: Quantities that come round.
+_ROUND = ('heading', 'angle')
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,32 +288,30 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     motions = evidence.motions(fit.point, True)
     known = quantities(evidence, motions)
     projection = Projection(fit)
-    count = int(setting('smooth_knots'))
-    floor = tuple((float(min(np.min(one[name]) for one in known)),
-                   float(max(np.max(one[name]) for one in known))) for name in ('x', 'y'))
+
+    def span(quantity: str, name: str) -> tuple[float, float]:
+        pooled = np.concatenate([one[name] for one in known])
+        return (0.0, 2.0 * np.pi) if quantity in _ROUND else (
+            float(np.min(pooled)), float(np.max(pooled)))
 
     def one_of(task: tuple[str, str]) -> Effort | None:
         balance, argument = task
         side = READINGS[balance][1] if balance in READINGS else BALANCES[balance][2]
-        quantity, rate = PAST[argument][0] if argument in PAST else argument, ''
-        if argument in RATED:
-            quantity, rate = RATED[argument][:2]
-        name = quantity if side == 'none' or quantity in (
-            'time', 'since_start') else f'{quantity}_{side}'
-        pooled = np.concatenate([one[name] for one in known])
-        low, high = (0.0, 2.0 * np.pi) if quantity in ('heading', 'angle') else (
-            float(np.min(pooled)), float(np.max(pooled)))
+        over, rate, *_ = RATED.get(argument, (
+            (PAST[argument][0] if argument in PAST else argument,), ''))
+        sided = [q if side == 'none' or q in _COMMON else f'{q}_{side}' for q in (*over, rate)]
+        names, own_rate = sided[:-1], sided[-1]
+        ranges = [span(*pair) for pair in zip(over, names, strict=True)]
+        low, high = ranges[0]
+        count = int(setting('smooth_knots' if len(over) == 1 else 'patch_knots'))
         parts, shapes = [], []
         for one, whitener in zip(known, evidence.whiteners, strict=True):
+            values = [one[name] for name in names]
             shape = responses(
-                one[name], probe_times(whitener.frame.drive), argument, count
-            ) if argument in PAST else patches(one['x'], one['y'], floor) if (
-                argument.startswith('patches')) else hats(one[name], low, high, count)
+                values[0], probe_times(whitener.frame.drive), argument, count
+            ) if argument in PAST else products_of_hats(values, ranges, count)
             if rate:
-                shape *= one[rate if side == 'none' else f'{rate}_{side}'][:, None]
-            if argument == 'driving_current':
-                # What helps forwards helps backwards.
-                shape *= one[f'sense_wheel_rate_{side}'][:, None]
+                shape *= one[own_rate][:, None]
             shapes.append(shape)
             parts.append(whitener.apply(
                 _misread(whitener, balance, shape) if balance in READINGS else
@@ -316,35 +322,13 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
         if not np.any(seen):
             return None
         columns, shapes = columns[:, seen], [shape[:, seen] for shape in shapes]
-        gain, explained, values, deviations = beyond_chance(evidence, fit, projection, columns)
-        largest = max(float(np.max(np.abs(shape @ values))) for shape in shapes)
-        return Effort(balance, argument, gain, explained, low, high, values, deviations, largest)
+        gain, explained, sizes, deviations = beyond_chance(evidence, fit, projection, columns)
+        largest = max(float(np.max(np.abs(shape @ sizes))) for shape in shapes)
+        return Effort(balance, argument, gain, explained, low, high, sizes, deviations, largest)
     tasks = [*((b, a) for b in BALANCES for a in ARGUMENTS[b]),
              *((b, argument) for b, (*_, own) in READINGS.items() for argument in own)]
     found = [one for one in evidence.pool.map(one_of, tasks) if one is not None]
     return tuple(sorted(found, key=lambda e: -e.evidence))
-
-
-def patches(x: FloatArray, y: FloatArray, floor: Sequence[tuple[float, float]]) -> FloatArray:
-    """
-    Return products of hat functions of both coordinates.
-
-    Parameters
-    ----------
-    x, y : numpy.ndarray, shape (n,)
-        [m]
-    floor : sequence of (float, float)
-        Ranges of both [m].
-
-    Returns
-    -------
-    numpy.ndarray, shape (n, k * k)
-
-    """
-    count = int(setting('patch_knots'))
-    across = hats(x, *floor[0], count), hats(y, *floor[1], count)
-    found: FloatArray = np.einsum('ni,nj->nij', *across).reshape(x.size, count * count)
-    return found
 
 
 def moved_by(whitener: Whitener, row: int, shape: FloatArray) -> FloatArray:
