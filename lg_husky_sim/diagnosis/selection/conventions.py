@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+import itertools
 import math
 
 from lg_husky_sim.diagnosis.evidence import student
@@ -53,11 +54,13 @@ def best_reading(evidence: Evidence, fit: Fit, afresh: bool = False) -> Fit:
 
     """
     chosen = _better(evidence, fit, _wheel_options, afresh)
-    return _better(evidence, chosen, _imu_options)
+    # The windows of a gyro are short against what it follows: a step tells what they gain.
+    return _better(evidence, chosen, _imu_options, least=setting('least_reading'))
 
 
 def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
-        Evidence, Reading], Sequence[Reading]], afresh: bool = False) -> Fit:
+        Evidence, Reading], Sequence[Reading]], afresh: bool = False, least: float = -math.inf
+        ) -> Fit:
     options = options_of(evidence, fit.point.reading)
     if not options:
         return fit
@@ -69,18 +72,10 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
         # bear runs away there, and does not begin there.
         with suppress(ParameterError):
             begins.append(_begun_at(evidence, nominal_of(fit.point)))
-    chosen: list[tuple[Point, Fit, float]] = []
-    for begin, inflation in begins:
-        points = [_read_so(evidence, begin.point, one) for one in options]
-        promised = evidence.pool.map(_promise_of(evidence, begin, inflation), points)
-        order = np.argsort(list(promised), kind='stable')[:int(setting('readings_fitted'))]
-        chosen += [(points[place], begin, inflation) for place in order]
-
-    def fitted(one: tuple[Point, Fit, float]) -> Fit:
-        point, begin, inflation = one
-        found = evidence.fit(point, begin.slopes, rounds=rounds, inflation=inflation)
-        return found if inflation == 1.0 else evidence.fit(found.point, rounds=rounds)
-    best = min(evidence.pool.map(fitted, chosen), key=lambda one: one.cost, default=fit)
+    raced = [_raced(evidence, *begin, options, rounds, least) for begin in begins]
+    best = min(itertools.chain(*raced), key=lambda one: one.cost, default=None)
+    if best is None:
+        return fit
     same = min(fit, evidence.fit(fit.point, rounds=rounds), key=lambda one: one.cost)
     if best.cost > same.cost - setting('reading_gain'):
         return fit if same.cost > fit.cost - setting('reading_gain') else same
@@ -93,6 +88,27 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
                     places=np.append(best.point.places, start_of(more)))
     slopes = [np.hstack([one, np.zeros((one.shape[0], len(more)))]) for one in best.slopes]
     return evidence.fit(wider, slopes, rounds=3, renew=range(known, known + len(more)))
+
+
+def _raced(evidence: Evidence, begin: Fit, inflation: float, options: Sequence[Reading],
+           rounds: int, least: float) -> list[Fit]:
+    # The readings that promise most, and enough, begin; those that are ahead after a few steps
+    # finish.
+    points = [_read_so(evidence, begin.point, one) for one in options]
+    promise = _promise_of(evidence, begin, inflation)
+    promised = np.array(list(evidence.pool.map(promise, points)))
+    enough = np.flatnonzero(promised <= promise(begin.point) - least)
+    order = enough[np.argsort(promised[enough], kind='stable')][:int(setting('readings_fitted'))]
+    first, last = int(setting('reading_start')), int(setting('readings_finished'))
+
+    def begun(place: int) -> Fit:
+        return evidence.fit(points[place], begin.slopes, rounds=first, inflation=inflation)
+
+    def finished(one: Fit) -> Fit:
+        found = evidence.fit(one.point, one.slopes, rounds=rounds - first, inflation=inflation)
+        return found if inflation == 1.0 else evidence.fit(found.point, rounds=rounds)
+    ahead = sorted(evidence.pool.map(begun, order.tolist()), key=lambda one: one.cost)[:last]
+    return list(evidence.pool.map(finished, ahead))
 
 
 def _begun_at(evidence: Evidence, start: Point) -> tuple[Fit, float]:
@@ -198,14 +214,16 @@ def _promise_of(evidence: Evidence, fit: Fit, inflation: float) -> Callable[[Poi
 
 def _read_so(evidence: Evidence, point: Point, reading: Reading) -> Point:
     # With as late a stream on the whole as before: what the reading is late, its stamps are not.
+    # Windows that the readings have in common stay as long as they were fitted.
     now = point.log
-    other = replace(reading, values={**now.values, **reading.values})
+    anew = {name: value for name, value in reading.values.items()
+            if name in _WINDOWS and point.reading.values.get(name) != value}
+    other = replace(reading, values={**reading.values, **now.values, **anew})
     period, wheels = _imu_period(evidence), _wheel_period(evidence)
     spared = {'delay_wheels': wheel_lag(now, wheels) - wheel_lag(other, wheels),
               'delay_imu': imu_lag(now, period) - imu_lag(other, period)}
     places = np.array([
-        place if u.kind != 'log' else u.place(reading.values[u.name]) if u.name in _WINDOWS and (
-            u.name in reading.values)
+        place if u.kind != 'log' else u.place(anew[u.name]) if u.name in anew
         else place + spared.get(u.name, 0.0)
         for u, place in zip(point.unknowns, point.places, strict=True)])
     return replace(point, reading=reading).at(places)
