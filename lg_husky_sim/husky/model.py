@@ -10,7 +10,7 @@ import enum
 from functools import lru_cache
 import math
 
-from lg_husky_sim.errors import ParameterError, UnknownParameterError
+from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky import network
 from lg_husky_sim.husky.command_lag import smooth_commands
 from lg_husky_sim.husky.command_lag import STATES as LAG_STATES
@@ -187,8 +187,9 @@ class _Regime:
                 self._volts[0 if name.endswith('_1') else 1, j] = 1.0
 
     def at(self, values: Mapping[str, float]) -> PlantSet:
-        if self._renamed:
-            values = {**values, **{name: values[own] for name, own in self._renamed.items()}}
+        # Names of functions are looked for among the parameters first: in a dict, for speed.
+        values = dict(values)
+        values.update({name: values[own] for name, own in self._renamed.items()})
         space: StateSpace = _sided(self.numeric.at(values), values['side_gain_ratio'])
         coefficients = np.zeros((self._laws.size, WIDTH))
         coefficients[:, MOTOR] = self._motors
@@ -258,9 +259,10 @@ class HuskyModel:
         """
         try:
             sets = tuple(regime.at(parameters) for regime in self.regimes)
-        except UnknownParameterError as error:
+        except (NameError, KeyError) as error:
+            name = error.name if isinstance(error, NameError) else error.args[0]
             raise ParameterError(
-                f'parameter {error.name!r} is missing; the structure needs it') from error
+                f'parameter {name!r} is missing; the structure needs it') from error
         return Plant(sets, self.regimes[0].states, self.structure.onset)
 
 
