@@ -3,6 +3,8 @@
 """
 What a step of the live node costs, and where; beside the smallest node that says as much.
 
+Times are processor times, which other work on the machine hardly changes; latencies are not.
+
     python benchmarks/node_cost.py [--rate 50] [--seconds 20]
 """
 
@@ -24,19 +26,20 @@ from lg_husky_sim.ros.engine import Engine
 from lg_husky_sim.ros.outputs import Outputs
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.signals import BodyTwist
+from lg_husky_sim.simulation.compiling import compile_here
 from lg_husky_sim.testing.live import isolated_domain, Probe
 
 HERE = Path(__file__).resolve().parent
 
 
 def microseconds(work: Callable[[], object], count: int = 3000) -> float:
-    """Return the median time of a call [µs] over batches of a hundred."""
+    """Return the median processor time of a call [µs] over batches of a hundred."""
     batches = []
     for _ in range(count // 100):
-        begun = time.perf_counter()
+        begun = time.process_time()
         for _ in range(100):
             work()
-        batches.append((time.perf_counter() - begun) / 100.0 * 1e6)
+        batches.append((time.process_time() - begun) / 100.0 * 1e6)
     return statistics.median(batches)
 
 
@@ -49,6 +52,8 @@ class Silent:
 
 def split() -> dict[str, float]:
     """Return the cost of each part of a step [µs]."""
+    # Without machine code on disk, steps would be made in plain Python for a while.
+    compile_here()
     settings = make_settings(command_timeout=0.0)
     engine = Engine(settings)
     engine.command(BodyTwist(0.5, 0.4))
