@@ -95,7 +95,8 @@ def ros_tool(name: str, preset: str | None, namespace: str | None, *, wait: floa
     words = click.get_current_context().meta.get(_KEY, [])
     try:
         with joined(words) as orderly:
-            preset, place = choose(orderly, words, preset=preset, namespace=namespace, wait=wait)
+            preset, place = choose(orderly, words, preset=preset, namespace=namespace, wait=wait,
+                                   say=say)
             tool = Tool(name, orderly, place)
             try:
                 settings = tool.settings(

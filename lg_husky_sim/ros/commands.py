@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 import math
 import time
 from types import TracebackType
@@ -15,7 +14,7 @@ from lg_husky_sim.ros import api
 from lg_husky_sim.ros.conversions import set_stamp
 from lg_husky_sim.ros.graph import Endpoint, listeners
 from lg_husky_sim.ros.settings import Settings
-from lg_husky_sim.ros.tool import Tool
+from lg_husky_sim.ros.tool import Say, Tool
 
 #: Zero commands that end everything, and the time between two of them [s].
 ZEROS = 5
@@ -25,8 +24,6 @@ SPACING = 0.02
 NAMES = 3.0
 #: How long nobody may listen before that is an error [s].
 DEAF = 1.0
-#: What a tool says to its user.
-Say = Callable[[str], object]
 
 
 def clamped(value: float, largest: float) -> float:

@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from lg_husky_sim.manoeuvres import Manoeuvre
-from lg_husky_sim.ros.commands import Commands, Say
+from lg_husky_sim.ros.commands import Commands
 from lg_husky_sim.ros.settings import Settings
-from lg_husky_sim.ros.tool import Tool
+from lg_husky_sim.ros.tool import Say, Tool
 
 NAME = 'lg_husky_driver'
 

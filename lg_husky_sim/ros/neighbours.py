@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.ros.api import message_type, Node, steady_timer
 from lg_husky_sim.ros.graph import publishers
 from lg_husky_sim.ros.settings import Settings
@@ -12,17 +13,53 @@ from lg_husky_sim.ros.settings import Settings
 EVERY = 1.0
 
 
+def _own(settings: Settings) -> dict[str, str]:
+    # What a node of these settings publishes for itself alone, by the setting that says so.
+    names = ['odometry_topic', 'ground_truth_topic', 'joint_states_topic', 'imu_topic']
+    if settings.publish_battery:
+        names.append('battery_topic')
+    if settings.scan != 'none':
+        names.append('scan_topic')
+    own = {name: str(getattr(settings, name)) for name in names}
+    return own | ({'publish_clock': '/clock'} if settings.publish_clock else {})
+
+
 def topics_out(settings: Settings) -> tuple[str, ...]:
     """Return the topics that a node of these settings publishes for itself alone."""
-    names = [settings.odometry_topic, settings.ground_truth_topic, settings.joint_states_topic,
-             settings.imu_topic]
-    if settings.publish_battery:
-        names.append(settings.battery_topic)
-    if settings.scan != 'none':
-        names.append(settings.scan_topic)
-    if settings.publish_clock:
-        names.append('/clock')
-    return tuple(names)
+    return tuple(_own(settings).values())
+
+
+def topics_in(settings: Settings) -> dict[str, str]:
+    """Return the topics that a node of these settings listens to, by setting."""
+    seen = settings.scan == 'map' and not settings.map_file
+    return {name: str(getattr(settings, name)) for name in
+            ('command_topic', 'initial_pose_topic', *(['map_topic'] if seen else []))}
+
+
+def refuse_doubled(node: Node, settings: Settings) -> None:
+    """
+    Refuse two settings that name one topic, on which messages of both would be mixed.
+
+    Parameters
+    ----------
+    node : Node
+        Its namespace and remappings count.
+    settings : Settings
+        What it publishes and listens to.
+
+    Raises
+    ------
+    SettingsError
+        If there are two.
+
+    """
+    first: dict[str, str] = {}
+    for name, topic in (_own(settings) | topics_in(settings)).items():
+        full = node.resolve_topic_name(topic)
+        if full in first:
+            raise SettingsError(f'{first[full]} and {name} are both {full}: each needs a topic '
+                                'of its own')
+        first[full] = name
 
 
 def shared(settings: Settings) -> tuple[str, ...]:
@@ -46,9 +83,8 @@ def announce(node: Node, settings: Settings) -> None:
         return ', '.join(node.resolve_topic_name(topic) for topic in topics)
 
     log = node.get_logger()
-    seen = settings.scan == 'map' and not settings.map_file
-    others = (settings.initial_pose_topic, *([settings.map_topic] if seen else []))
-    log.info(f'in: {named((settings.command_topic,))} ({settings.command_type}), {named(others)}')
+    command, *others = topics_in(settings).values()
+    log.info(f'in: {named((command,))} ({settings.command_type}), {named(tuple(others))}')
     log.info('out: ' + named(
         (*topics_out(settings), *shared(settings), *for_diagnosis(settings))))
 

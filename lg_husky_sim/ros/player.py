@@ -10,7 +10,7 @@ from typing import Any
 
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.ros import api
-from lg_husky_sim.ros.commands import Commands, NAMES, Say
+from lg_husky_sim.ros.commands import Commands, NAMES
 from lg_husky_sim.ros.conversions import (
     fill_odometry,
     imu_message,
@@ -20,7 +20,7 @@ from lg_husky_sim.ros.conversions import (
 )
 from lg_husky_sim.ros.graph import Endpoint, publishers
 from lg_husky_sim.ros.settings import Settings
-from lg_husky_sim.ros.tool import Tool
+from lg_husky_sim.ros.tool import Say, Tool
 from lg_husky_sim.signals import BodyTwist, Pose, TimeSeries
 import numpy as np
 

@@ -13,10 +13,9 @@ from typing import Any
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.ros import api
 from lg_husky_sim.ros.bag_writer import bag_writer
-from lg_husky_sim.ros.commands import Say
 from lg_husky_sim.ros.graph import publishers
 from lg_husky_sim.ros.settings import Settings
-from lg_husky_sim.ros.tool import Ended, LOOK, Tool
+from lg_husky_sim.ros.tool import Ended, LOOK, Say, Tool
 
 NAME = 'lg_husky_recorder'
 #: Samples kept while the disk is busy.
@@ -177,7 +176,7 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
     seconds : float, optional
         How long [s], from the first message on, or from when all in the graph are known.
     say : callable
-        Is told every few seconds how much has come.
+        Is told at once what is listened to, and every few seconds how much has come.
 
     Returns
     -------
@@ -192,8 +191,11 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
     """
     recorder = Recorder(tool.node, path, recorded_topics(settings), storage)
     try:
+        say(f'listening to {", ".join(recorder.counts)}')
         try:
             _await_first(tool, recorder)
+            say('recording ' + ('until Ctrl-C' if seconds is None else f'for {seconds:g} s')
+                + ('' if any(recorder.counts.values()) else '; nothing has been received yet'))
             begun = time.monotonic()
             due = begun + EVERY
             while seconds is None or time.monotonic() < begun + seconds:

@@ -16,7 +16,7 @@ from lg_husky_sim.ros.control import Control
 from lg_husky_sim.ros.diagnostics import Diagnostics
 from lg_husky_sim.ros.engine import Engine, Reading
 from lg_husky_sim.ros.navigation import Navigation
-from lg_husky_sim.ros.neighbours import announce, Neighbours
+from lg_husky_sim.ros.neighbours import announce, Neighbours, refuse_doubled
 from lg_husky_sim.ros.outputs import Outputs
 from lg_husky_sim.ros.parameters import declare_settings, LiveSettings
 from lg_husky_sim.ros.settings import Settings
@@ -65,6 +65,7 @@ class SimNode(Node):
         log = self.get_logger()
         log.info(describe_backend())
         self.settings = declare_settings(self)
+        refuse_doubled(self, self.settings)
         self.engine = Engine(self.settings)
         self.outputs = Outputs(self, self.settings)
         self.navigation = Navigation(self, self.settings)

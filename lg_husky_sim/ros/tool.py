@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import math
 import os
@@ -19,6 +19,8 @@ from lg_husky_sim.ros.graph import find_robots, NAMED, Robot, the_one
 from lg_husky_sim.ros.parameters import given_settings
 from lg_husky_sim.ros.settings import BY_NAME, DEFAULT_PRESET, make_settings, Settings
 
+#: What a tool says to its user.
+Say = Callable[[str], object]
 #: Longest stay in one wait [s]; constant, for rclpy forgets who is ready when it changes.
 WAIT = 0.01
 #: Time between two looks at who is in the graph [s].
@@ -274,7 +276,8 @@ def look_for(orderly: Orderly, *, preset: str | None, namespace: str | None, wai
 
 
 def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = None,
-           namespace: str | None = None, wait: float = 10.0) -> tuple[str, str | None]:
+           namespace: str | None = None, wait: float = 10.0, say: Say = print
+           ) -> tuple[str, str | None]:
     """
     Return preset and namespace of the robot to serve.
 
@@ -291,6 +294,8 @@ def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = N
         From the command line.
     wait : float
         How long to look for a robot [s].
+    say : callable
+        Is told what is looked for, before it takes its time, and what was found.
 
     Raises
     ------
@@ -307,9 +312,12 @@ def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = N
     place = namespace or remapped or os.environ.get('ROS_NAMESPACE') or None
     if preset is None or place is None:
         named = {name: said for name in NAMED if (said := _said(arguments, name)) is not None}
-        robot = look_for(orderly, preset=preset, namespace=place, wait=wait if preset is None
-                         else min(wait, OTHERS), named=named)
+        wait = wait if preset is None else min(wait, OTHERS)
+        say(f'looking for the robot in the graph, for up to {wait:g} s; once there is one, '
+            f'{OTHERS:g} s for others')
+        robot = look_for(orderly, preset=preset, namespace=place, wait=wait, named=named)
         if robot is not None:
+            say(f'found {robot.words()}')
             preset, place = robot.preset, place or robot.namespace
         elif preset is None:
             where = f'below {place} ' if place else ''

@@ -5,13 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
 import time
 
 from lg_husky_sim.errors import CommandError, SettingsError
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
-from lg_husky_sim.ros import commands
+from lg_husky_sim.ros import api, commands
 from lg_husky_sim.ros.driver import drive
 from lg_husky_sim.ros.graph import Endpoint, find_robots, Robot, the_one
+from lg_husky_sim.ros.recorder import NAME, record
 from lg_husky_sim.ros.settings import make_settings
 from lg_husky_sim.ros.tool import choose, Orderly, Tool
 from lg_husky_sim.testing.live import Probe
@@ -84,6 +87,37 @@ def test_a_second_robot_that_is_told_of_later_is_waited_for(
         robots[:1 + sum(time.monotonic() > begun + later for later in (2.5, 2.8))]))
     with Orderly() as orderly, pytest.raises(SettingsError, match='3 Huskies are in the graph'):
         choose(orderly, (), preset=preset)
+
+
+@pytest.mark.skipif(not any(map(find_spec, ('rosbags', 'rosbag2_py'))),
+                    reason='nothing is installed that writes bags')
+def test_a_recorder_says_at_once_what_it_does(
+        probe: Probe, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """It was silent for 3.5 s of looking, and for 5 s more until the first counts."""
+    monkeypatch.setattr('lg_husky_sim.ros.tool.OTHERS', 0.3)
+    mouth, odometry = probe.talk('nav_msgs/msg/Odometry', '/early/platform/odom')
+    probe.talk('geometry_msgs/msg/TwistStamped', '/early/platform/cmd_vel')
+    said: list[str] = []
+    with Orderly() as orderly:
+        chosen = choose(orderly, [], namespace='/early', wait=20.0, say=said.append)
+        assert chosen == ('clearpath_jazzy', '/early')
+        assert said == [
+            'looking for the robot in the graph, for up to 20 s; once there is one, 0.3 s for '
+            'others', 'found --preset clearpath_jazzy --namespace /early']
+        del said[:]
+        one = Tool(NAME, orderly, '/early')
+
+        def say(text: str) -> None:
+            said.append(text)
+            if len(said) == 1:
+                api.steady_timer(one.node, 0.05, lambda: mouth.publish(odometry()))
+        try:
+            record(one, tmp_path / 'bag', make_settings(preset='clearpath_jazzy'), seconds=1.0,
+                   say=say)
+        finally:
+            one.close()
+    assert said[0].startswith('listening to /early/platform/cmd_vel, /early/platform/odom, ')
+    assert said[1] == 'recording for 1 s; nothing has been received yet'
 
 
 def test_the_graph_is_not_left_between_looking_and_serving(

@@ -195,6 +195,10 @@ MISTAKES = (
     (['-p', 'model:=/no/such/file.yaml'], "model = '/no/such/file.yaml' cannot be used"),
     (['-p', 'imu_rate:=30.0'], 'imu_rate = 30 Hz must be rate = 50 Hz divided by'),
     (['-p', 'publish_tf:=1'], 'publish_tf = 1 is int, not bool'),
+    (['-p', 'ground_truth_topic:=odom', '-p', 'odometry_topic:=/odom'],
+     'odometry_topic and ground_truth_topic are both /odom: each needs a topic of its own'),
+    (['-r', '/husky_velocity_controller/cmd_vel:=joint_states'],
+     'joint_states_topic and command_topic are both /joint_states'),
     (['--params-file', '/no/such.yaml'], '/no/such.yaml'),
 )
 
