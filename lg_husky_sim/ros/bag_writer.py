@@ -7,8 +7,11 @@ from __future__ import annotations
 import ctypes
 from importlib import import_module
 from importlib.util import find_spec
+import json
 import os
 from pathlib import Path
+import shutil
+import tempfile
 from typing import Any, Final, Protocol
 
 from lg_husky_sim.errors import MissingExtraError, RecordingError
@@ -30,6 +33,8 @@ LATCHED = """\
 """
 #: Version of the metadata that has these as words.
 _VERSION: Final = 9
+#: Loggers that warn where a bag without an index is read.
+_WARNING = ('rosbag2_storage_mcap', 'rosbag2_cpp')
 
 
 def latched(topic: str) -> bool:
@@ -80,6 +85,7 @@ class Rosbag2Writer:
     def __init__(self, path: Path, storage: str) -> None:
         """Open the bag."""
         self._module = rosbag2_py = import_module('rosbag2_py')
+        self._path = path
         self._writer = rosbag2_py.SequentialWriter()
         # Neither cache nor chunks: each message is in the file within a few kilobytes. The
         # preset of that name means other things to sqlite3, whose default is safe already.
@@ -89,7 +95,8 @@ class Rosbag2Writer:
                                       storage_preset_profile=preset),
             rosbag2_py.ConverterOptions('cdr', 'cdr'))
         self._count = 0
-        self._buffered = storage == 'mcap' and os.name == 'posix'
+        self._mcap = storage == 'mcap'
+        self._buffered = self._mcap and os.name == 'posix'
 
     def add(self, topic: str, kind: str) -> None:
         """Tell of a topic before its first message."""
@@ -110,8 +117,62 @@ class Rosbag2Writer:
             ctypes.CDLL(None).fflush(None)
 
     def close(self) -> None:
-        """Complete the bag."""
+        """Complete the bag; chunks and an index, which take no flush, come into it now."""
         self._writer.close()
+        if self._mcap:
+            indexed(self._path)
+
+
+def indexed(path: Path) -> None:
+    """
+    Give a closed bag of mcap an index, with which players and viewers jump to any time.
+
+    The bag is written anew beside itself, at some 400 MB/s, and takes the place of the old one
+    when it is whole. Where that fails, the old one stays, which can be read as well; a warning
+    says why.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of the bag.
+
+    """
+    logging, bags = import_module('rclpy.logging'), import_module('rosbag2_py')
+    # They warn of the missing index, which is what this is for.
+    for name in _WARNING:
+        logging.set_logger_level(name, logging.LoggingSeverity.ERROR)
+    try:
+        if shutil.disk_usage(path).free < 2 * sum(
+                one.stat().st_size for one in path.glob('*.mcap')):
+            raise RecordingError('the disk is too full')
+        with tempfile.TemporaryDirectory(prefix='.index-', dir=path) as folder:
+            new, wanted = Path(folder) / path.name, Path(folder) / 'wanted.yaml'
+            wanted.write_text(json.dumps({'output_bags': [{
+                'uri': str(new), 'storage_id': 'mcap', 'all_topics': True,
+                'include_hidden_topics': True}]}), encoding='utf-8')
+            bags.bag_rewrite([bags.StorageOptions(uri=str(path), storage_id='mcap')], str(wanted))
+            if _messages(path) != _messages(new):
+                raise RecordingError('it could not be written anew')
+            for one in new.iterdir():
+                one.replace(path / one.name)
+    except (RecordingError, RuntimeError, OSError) as error:
+        logging.get_logger('lg_husky_recorder').warning(
+            f'{path} has no index: {error}')
+    finally:
+        for name in _WARNING:
+            logging.set_logger_level(name, logging.LoggingSeverity.UNSET)
+
+
+def _messages(folder: Path) -> dict[str, int]:
+    # How many there are in each file, by what stands at its end.
+    bags = import_module('rosbag2_py')
+    counts = {}
+    for one in folder.glob('*.mcap'):
+        reader = bags.SequentialReader()
+        reader.open(bags.StorageOptions(uri=str(one), storage_id='mcap'),
+                    bags.ConverterOptions('cdr', 'cdr'))
+        counts[one.name] = int(reader.get_metadata().message_count)
+    return counts
 
 
 class RosbagsWriter:

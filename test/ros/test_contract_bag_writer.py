@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+import shutil
 import sqlite3
 from typing import Any
 
@@ -62,6 +64,38 @@ def test_a_short_message_is_on_disk_after_a_flush(
         with sqlite3.connect(path) as base:
             assert base.execute('SELECT COUNT(*) FROM messages').fetchone() == (1,)
     writer.close()
+
+
+@pytest.mark.skipif('Rosbag2Writer' not in writers(), reason='rosbag2_py is not installed')
+@pytest.mark.parametrize('full', [False, True])
+def test_a_bag_by_ros_has_an_index_and_all_its_messages(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
+        full: bool) -> None:
+    """Without one, players warn and read all that lies before the time to which they jump."""
+    rosbag2_py = import_module('rosbag2_py')
+    if full:
+        monkeypatch.setattr(shutil, 'disk_usage', lambda path: shutil._ntuple_diskusage(1, 1, 0))
+    path = tmp_path / 'a bag: "1"'
+    writer = bag_writer.Rosbag2Writer(path, 'mcap')
+    for topic in ('/said', '/_hidden', '/never'):
+        writer.add(topic, 'std_msgs/msg/String')
+    raw = b'\x00\x01\x00\x00\x04\x00\x00\x00one\x00'
+    wanted = [(topic, raw, 10**18 + k) for k in range(500) for topic in ('/said', '/_hidden')]
+    for topic, data, moment in wanted:
+        writer.write(topic, moment, data)
+    writer.close()
+    said = capfd.readouterr().err
+    assert ('has no index: the disk is too full' in said) == full
+    assert full or 'WARN' not in said
+    assert sorted(one.name for one in path.iterdir()) == [f'{path.name}_0.mcap', 'metadata.yaml']
+    reader = rosbag2_py.SequentialReader()
+    reader.open(rosbag2_py.StorageOptions(uri=str(path), storage_id='mcap'),
+                rosbag2_py.ConverterOptions('cdr', 'cdr'))
+    assert [reader.read_next() for _ in wanted] == wanted
+    assert not reader.has_next()
+    assert {one.name for one in reader.get_all_topics_and_types()} == {
+        '/said', '/_hidden', '/never'}
+    assert ('no message index' in capfd.readouterr().err) == full
 
 
 @pytest.mark.skipif(not api.HAVE_RCLPY, reason='the embedded backend makes objects of all')
