@@ -21,6 +21,7 @@ ARGUMENTS = (
     ('namespace', '', 'namespace of all nodes'),
     ('model', '', 'model file; empty: the packaged Husky'),
     ('parameters', '', 'file of parameters for sim_node, such as config/nav2.yaml'),
+    ('use_sim_time', 'false', 'true: all nodes take their time from /clock'),
     ('state_publisher', 'auto', 'robot_state_publisher with the packaged URDF: true, false, or '
      'auto: if it is installed'),
     ('rviz', 'false', 'start RViz with the packaged layout'),
@@ -50,7 +51,7 @@ def _start(context: LaunchContext) -> list[LogInfo | Node]:
         return LaunchConfiguration(name).perform(context)
 
     for name, allowed in (('state_publisher', ('auto', 'true', 'false')),
-                          ('rviz', ('true', 'false'))):
+                          ('rviz', ('true', 'false')), ('use_sim_time', ('true', 'false'))):
         if value(name) not in allowed:
             message = f'{name}:={value(name)} is not allowed: {", ".join(allowed)}'
             raise RuntimeError(message)
@@ -60,8 +61,10 @@ def _start(context: LaunchContext) -> list[LogInfo | Node]:
         _needed('robot_state_publisher', 'state_publisher:=true')
     share = Path(get_package_share_directory('lg_husky_sim'))
     namespace, preset = value('namespace'), value('preset')
+    # Without the argument, what a launch file around this one sets for all nodes is in force.
+    timed: dict[str, object] = {'use_sim_time': True} if value('use_sim_time') == 'true' else {}
     # tf must show the base, or nothing can be drawn.
-    own: dict[str, object] = {'preset': preset, 'publish_tf': True}
+    own = {'preset': preset, 'publish_tf': True, **timed}
     if value('model'):
         own['model'] = value('model')
     parameters: list[object] = [own]
@@ -86,12 +89,13 @@ def _start(context: LaunchContext) -> list[LogInfo | Node]:
             remappings.append(('joint_states', 'platform/joint_states'))
         actions.append(Node(
             package='robot_state_publisher', executable='robot_state_publisher',
-            namespace=namespace, parameters=[{'robot_description': urdf}],
+            namespace=namespace, parameters=[{'robot_description': urdf, **timed}],
             remappings=remappings))
     if value('rviz') == 'true':
         actions.append(Node(
             package='rviz2', executable='rviz2', namespace=namespace, remappings=OWN_TRANSFORMS,
-            arguments=['-d', str(share / 'config' / 'husky.rviz')]))
+            arguments=['-d', str(share / 'config' / 'husky.rviz')],
+            parameters=[timed] if timed else None))
     return actions
 
 

@@ -75,6 +75,33 @@ def tree(messages: list[Any], fixed: list[Any]) -> Any:
     return buffer
 
 
+def test_all_nodes_take_their_time_from_the_clock(
+        probe: Probe, launched: Callable[..., None]) -> None:
+    """`use_sim_time:=true`, as other launch files take it; it had no effect."""
+    mouth, kind = probe.talk('rosgraph_msgs/msg/Clock', '/clock')
+    heard = probe.listen('nav_msgs/msg/Odometry', '/timed/ground_truth', 500)
+    launched('namespace:=timed', 'use_sim_time:=true', 'state_publisher:=true')
+    now = kind()
+    now.clock.sec = 1000
+
+    def passing() -> bool:
+        now.clock.nanosec = (now.clock.nanosec + 20_000_000) % 10**9
+        now.clock.sec += now.clock.nanosec == 0
+        mouth.publish(now)
+        probe.spin(0.02)
+        return len(heard) > 20
+    assert probe.until(passing, PATIENCE)
+    assert all(999 <= one.header.stamp.sec <= now.clock.sec for one in heard[1:])
+    service = import_module('rcl_interfaces.srv').GetParameters
+    asking: Any = probe.node
+    for node in ('sim_node', 'robot_state_publisher'):
+        client = asking.create_client(service, f'/timed/{node}/get_parameters')
+        assert probe.until(client.service_is_ready, PATIENCE)
+        answer = client.call_async(service.Request(names=['use_sim_time']))
+        assert probe.until(answer.done, PATIENCE)
+        assert answer.result().values[0].bool_value, node
+
+
 @pytest.mark.realtime
 def test_wheels_turn_on_tf_as_the_joints_say(probe: Probe, launched: Callable[..., None]) -> None:
     """Preset clearpath_jazzy in a namespace: one tree of frames, from odom to wheels and IMU."""
