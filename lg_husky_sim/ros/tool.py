@@ -313,8 +313,7 @@ def choose(orderly: Orderly, arguments: Sequence[str], *, preset: str | None = N
     if preset is None or place is None:
         named = {name: said for name in NAMED if (said := _said(arguments, name)) is not None}
         wait = wait if preset is None else min(wait, OTHERS)
-        say(f'looking for the robot in the graph, for up to {wait:g} s; once there is one, '
-            f'{OTHERS:g} s for others')
+        say(f'looking for the robot (up to {wait:g} s), then for others ({OTHERS:g} s)')
         robot = look_for(orderly, preset=preset, namespace=place, wait=wait, named=named)
         if robot is not None:
             say(f'found {robot.words()}')

@@ -102,8 +102,8 @@ def test_a_recorder_says_at_once_what_it_does(
         chosen = choose(orderly, [], namespace='/early', wait=20.0, say=said.append)
         assert chosen == ('clearpath_jazzy', '/early')
         assert said == [
-            'looking for the robot in the graph, for up to 20 s; once there is one, 0.3 s for '
-            'others', 'found --preset clearpath_jazzy --namespace /early']
+            'looking for the robot (up to 20 s), then for others (0.3 s)',
+            'found --preset clearpath_jazzy --namespace /early']
         del said[:]
         one = Tool(NAME, orderly, '/early')
 

@@ -29,6 +29,7 @@ import pytest
 
 FAST = Manoeuvre('fast', (Step(20.0, 3.0, -4.0),))
 COMMAND = '/husky_velocity_controller/cmd_vel'
+LOOKING = 'looking for the robot (up to {} s), then for others (3.5 s)\n'
 #: A parent that starts a tool and dies without a word.
 CRUEL_PARENT = """
 import os, subprocess, sys
@@ -112,8 +113,7 @@ def test_commands_stay_within_the_limits_and_an_error_stops_the_robot(probe: Pro
 
     try:
         with pytest.raises(ZeroDivisionError):
-            drive(tool, FAST, make_settings(preset='husky_ros1'), say=said.append,
-                  progress=fail)
+            drive(tool, FAST, make_settings(preset='husky_ros1'), say=said.append, progress=fail)
     finally:
         tool.close()
     probe.spin(0.2)
@@ -224,13 +224,13 @@ def test_a_namespaced_robot_is_found_recorded_and_named_if_there_are_two(
     assert '/a200_0000/platform/odom' in out
     from lg_husky_sim.recording import read_recording
     assert set(read_recording(tmp_path / 'bag').streams) >= {'wheels', 'imu'}
-    other = probe.listen('nav_msgs/msg/Odometry', '/b/husky_velocity_controller/odom')
-    start(arguments=('-r', '__ns:=/b')).ready(other)
+    start(arguments=('-r', '__ns:=/b')).ready(
+        probe.listen('nav_msgs/msg/Odometry', '/b/husky_velocity_controller/odom'))
     two = run('record', tmp_path / 'two')
-    _, said = two.communicate(timeout=120.0)
+    said = two.communicate(timeout=120.0)[1]
     assert (two.returncode, said) == (
-        1, 'error: 2 Huskies are in the graph, choose one: --preset clearpath_jazzy --namespace '
-        '/a200_0000; --preset paper --namespace /b\n')
+        1, LOOKING.format(10) + 'error: 2 Huskies are in the graph, choose one: --preset '
+        'clearpath_jazzy --namespace /a200_0000; --preset paper --namespace /b\n')
     words = ('drive', 'circle', '--ros-args', '-r', '__ns:=/a200_0000', '-p', 'max_forward:=0.1')
     driver = run(*words, env=os.environ | {'ROS_NAMESPACE': '/b'})
     told = probe.listen('geometry_msgs/msg/TwistStamped', '/a200_0000/platform/cmd_vel')
@@ -268,9 +268,8 @@ def test_playing_names_who_else_publishes(
 
 def test_an_unknown_parameter_of_a_tool_is_named(probe: Probe, tmp_path: Path) -> None:
     """What is misspelt would be recorded without; parameters of other nodes end nothing."""
-    spoken = run('record', tmp_path / 'bag', '--preset', 'paper', '--namespace', '/nobody',
-                 '--seconds', '0.5', '--ros-args', '-p', 'imu_topics:=/x', '-p',
-                 'use_sim_time:=false')
+    spoken = run(*f'record {tmp_path}/bag --preset paper --namespace /nobody --seconds 0.5 '
+                 '--ros-args -p imu_topics:=/x -p use_sim_time:=false'.split())
     out, said = spoken.communicate(timeout=120.0)
     assert (out + said).count('is ignored') == 1
     assert 'parameter imu_topics is unknown; did you mean imu_topic?; it is ignored' in out + said
@@ -281,7 +280,8 @@ def test_a_tool_without_a_robot_says_so(probe: Probe, tmp_path: Path) -> None:
     lonely = run('record', tmp_path / 'bag', '--wait', '0.5', '--namespace', '/nobody')
     _, said = lonely.communicate(timeout=120.0)
     assert lonely.returncode == 1
-    assert said.startswith('error: no robot is below /nobody in the graph (backend ')
+    assert said.startswith(
+        LOOKING.format(0.5) + 'error: no robot is below /nobody in the graph (backend ')
     assert not (tmp_path / 'bag').exists()
     empty = run('record', tmp_path / 'bag', '--preset', 'husky_ros1', '--namespace', '/nobody',
                 '--seconds', '0.5')
