@@ -30,7 +30,8 @@ def command(bag: Path, preset: str | None, namespace: str | None, storage: str,
     from lg_husky_sim.ros.recorder import NAME, record
 
     with ros_tool(NAME, preset, namespace, wait=wait) as (tool, settings):
-        counts = record(tool, bag, settings, storage=storage, seconds=seconds, say=say)
+        counts = record(tool, bag, settings, storage=storage, seconds=seconds, wait=wait,
+                        say=say)
     for topic, count in counts.items():
         click.echo(f'{count:8d}  {topic}')
     click.echo(f'{bag} written')

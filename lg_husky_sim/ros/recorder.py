@@ -58,6 +58,11 @@ def adapted(node: api.Node, topic: str, kind: str) -> tuple[bool, bool]:
     return all(end.reliable for end in ends), bool(ends) and all(end.latched for end in ends)
 
 
+def _simulated(node: api.Node) -> Callable[[], int]:
+    clock = node.get_clock()
+    return lambda: int(clock.now().nanoseconds)
+
+
 class Recorder:
     """
     Subscribes to topics as their publishers offer them and writes what comes into a bag.
@@ -65,7 +70,8 @@ class Recorder:
     Parameters
     ----------
     node : api.Node
-        Whoever spins it makes the recording go on.
+        Whoever spins it makes the recording go on. Messages are stamped by the system's clock,
+        or with its ``use_sim_time`` by /clock.
     path : Path
         Folder to make; must not exist yet.
     topics : mapping of str to str
@@ -86,6 +92,7 @@ class Recorder:
         self.path = path
         self.counts: dict[str, int] = {}
         self._node = node
+        self._now = _simulated(node) if node.get_parameter('use_sim_time').value else time.time_ns
         self._writer: Any = bag_writer(path, storage)
         self._kinds = {node.resolve_topic_name(topic): kind for topic, kind in topics.items()}
         self._heard: dict[str, tuple[tuple[bool, bool], Any]] = {}
@@ -119,7 +126,7 @@ class Recorder:
     def _writing(self, topic: str) -> Callable[[bytes], None]:
         def write(raw: bytes) -> None:
             if self._writer is not None:
-                self._writer.write(topic, time.time_ns(), raw)
+                self._writer.write(topic, self._now(), raw)
                 self.counts[topic] += 1
         return write
 
@@ -159,7 +166,8 @@ def _await_first(tool: Tool, recorder: Recorder) -> None:
 
 
 def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
-           seconds: float | None = None, say: Say = print) -> dict[str, int]:
+           seconds: float | None = None, wait: float = 10.0, say: Say = print
+           ) -> dict[str, int]:
     """
     Record until the time is over or the tool is asked to end.
 
@@ -174,7 +182,10 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
     storage : str
         ``mcap`` or ``sqlite3``.
     seconds : float, optional
-        How long [s], from the first message on, or from when all in the graph are known.
+        How long [s], from the first message on, or from when all in the graph are known; of
+        simulated time with ``use_sim_time``.
+    wait : float
+        How long to wait for the first /clock with ``use_sim_time`` [s].
     say : callable
         Is told at once what is listened to, and every few seconds how much has come.
 
@@ -187,8 +198,13 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
     ------
     RecordingError
         If nothing came; no bag is left then.
+    CommandError
+        If simulated time is asked for and nobody publishes it.
 
     """
+    if tool.simulated:
+        say('waiting for /clock')
+        tool.wait_for_time(wait)
     recorder = Recorder(tool.node, path, recorded_topics(settings), storage)
     try:
         say(f'listening to {", ".join(recorder.counts)}')
@@ -196,13 +212,12 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
             _await_first(tool, recorder)
             say('recording ' + ('until Ctrl-C' if seconds is None else f'for {seconds:g} s')
                 + ('' if any(recorder.counts.values()) else '; nothing has been received yet'))
-            begun = time.monotonic()
-            due = begun + EVERY
-            while seconds is None or time.monotonic() < begun + seconds:
+            begun, due = tool.now(), time.monotonic() + EVERY
+            while seconds is None or tool.now() < begun + seconds:
                 tool.serve()
                 if time.monotonic() >= due:
                     due += EVERY
-                    say(running(recorder.counts, time.monotonic() - begun))
+                    say(running(recorder.counts, tool.now() - begun))
         except Ended:
             say('stopped')
         empty = not any(recorder.counts.values())
