@@ -27,8 +27,11 @@ def command(bag: Path, preset: str | None, namespace: str | None, storage: str,
 
     The bag is written as it grows: a process that is killed loses at most its last second.
     """
+    from lg_husky_sim.ros import bag_writer
     from lg_husky_sim.ros.recorder import NAME, record
 
+    # Before anything is waited for.
+    bag_writer.check(bag, storage)
     with ros_tool(NAME, preset, namespace, wait=wait) as (tool, settings):
         counts = record(tool, bag, settings, storage=storage, seconds=seconds, wait=wait,
                         say=say)

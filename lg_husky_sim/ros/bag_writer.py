@@ -226,9 +226,9 @@ class RosbagsWriter:
         self._writer.close()
 
 
-def bag_writer(path: Path, storage: str) -> BagWriter:
+def check(path: Path, storage: str) -> None:
     """
-    Open a new bag.
+    Check whether a new bag can be opened.
 
     Parameters
     ----------
@@ -249,13 +249,19 @@ def bag_writer(path: Path, storage: str) -> BagWriter:
         raise RecordingError(f'storage {storage!r} is unknown; there are {", ".join(STORAGES)}')
     if path.exists() or path.is_symlink():
         raise RecordingError(f'{path} exists already; choose another name or remove it')
-    if api.HAVE_RCLPY and find_spec('rosbag2_py') is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return Rosbag2Writer(path, storage)
-    if find_spec('rosbags') is None:
+    if not _by_ros() and find_spec('rosbags') is None:
         tail = (' or sudo apt install ros-jazzy-rosbag2-py ros-jazzy-rosbag2-storage-mcap'
                 if api.HAVE_RCLPY else '')
         raise MissingExtraError(
             f'nothing is installed that writes recordings: pip install rosbags{tail}')
+
+
+def _by_ros() -> bool:
+    return api.HAVE_RCLPY and find_spec('rosbag2_py') is not None
+
+
+def bag_writer(path: Path, storage: str) -> BagWriter:
+    """Open a new bag at a path, by one of the storages, after :func:`check`."""
+    check(path, storage)
     path.parent.mkdir(parents=True, exist_ok=True)
-    return RosbagsWriter(path, storage)
+    return Rosbag2Writer(path, storage) if _by_ros() else RosbagsWriter(path, storage)

@@ -7,6 +7,8 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
+from click.testing import CliRunner
+from lg_husky_sim.cli.record import command
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.ros import api
 from lg_husky_sim.ros.recorder import NAME, record
@@ -52,6 +54,11 @@ def test_simulated_time_stamps_a_bag_and_ends_it(tmp_path: Path) -> None:
     assert told['duration']['nanoseconds'] == pytest.approx(20e9, abs=4e9)
     began = told['starting_time']['nanoseconds_since_epoch']
     assert 1000e9 <= began <= (10_000 + ticks) * 1e8
+
+
+def test_a_taken_name_is_told_before_a_robot_is_looked_for(tmp_path: Path) -> None:
+    done = CliRunner().invoke(command, [str(tmp_path), '--wait', '0'])
+    assert str(done.exception) == f'{tmp_path} exists already; choose another name or remove it'
 
 
 def test_a_clock_that_does_not_come_is_an_error(tmp_path: Path) -> None:
