@@ -24,7 +24,7 @@ def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
     wheel rate w::
 
         w_f' = (r/T - w_f) / loop_lag
-        V    = T w_f + loop_gain (w_f - w) + I,   clipped to the supply
+        V    = loop_forward_share T w_f + loop_gain (w_f - w) + I,   clipped to the supply
         I'   = loop_integral (w_f - w) + (V_clipped - V) loop_integral / (loop_gain + T)
 
     Effects that act on the driver's voltage see it clipped.
@@ -35,7 +35,7 @@ def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
         Open loop.
     values : mapping of str to float
         Must hold torque_constant, gear_ratio, supply_voltage, loop_lag, loop_gain,
-        loop_integral.
+        loop_integral, loop_forward_share.
 
     Returns
     -------
@@ -49,7 +49,8 @@ def close_speed_loop(plant: PlantSet, values: Mapping[str, float]) -> PlantSet:
     lag = values['loop_lag']
     unwind = integral / (gain + transmission)
     wheels = plant.rows[:2]
-    volts = np.hstack([-gain * wheels, (transmission + gain) * np.eye(2), np.eye(2)])
+    forward = values['loop_forward_share'] * transmission
+    volts = np.hstack([-gain * wheels, (forward + gain) * np.eye(2), np.eye(2)])
     a = np.zeros((n + 4, n + 4))
     a[:n, :n] = plant.a
     a[:n] += plant.b @ volts

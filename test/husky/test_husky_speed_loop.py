@@ -77,6 +77,20 @@ def test_a_stall_clips_at_the_supply_and_unwinds(robot: Maker) -> None:
     assert np.abs(late - wanted).max() < 0.1 * wanted
 
 
+def test_what_is_fed_forward_is_a_share_of_the_back_emf(robot: Maker) -> None:
+    """Without an integral the law alone says what is in balance: V = s T w_f + k (w_f - w)."""
+    for share, gain in ((0.0, 2.0), (0.5, 0.5), (1.0, 1.0)):
+        out = driven(robot('speed_loop', loop_lag=0.05, loop_gain=gain, loop_integral=0.0,
+                           loop_forward_share=share), (0.4, 0.3))
+        wanted = VOLTS / T * (0.4 + 0.541 * np.array([-1.0, 1.0]) * 0.3)
+        volts = share * T * wanted + gain * (wanted - out[-1, :2])
+        assert out[-1, V_LEFT:V_LEFT + 2] == pytest.approx(volts, rel=1e-3), share
+    alone = driven(robot('speed_loop', loop_lag=0.01, loop_gain=1.1, loop_integral=14.0,
+                         loop_forward_share=0.0), (0.4, 0.3))
+    assert alone[-1, :2] == pytest.approx(wanted, rel=1e-3)
+    assert alone[5, LEFT] < 0.7 * wanted[LEFT]
+
+
 def test_the_loop_stands_still_at_rest(robot: Maker) -> None:
     out = driven(robot('speed_loop'), (0.0, 0.0), seconds=1.0)
     assert not np.any(out[:, :7])

@@ -58,6 +58,7 @@ def started(nominal: ModelFile, base: Mapping[str, float], settings: Settings) -
         'latency': base['dead_time'], 'slew_forward': base['slew_forward'],
         'slew_yaw': base['slew_yaw'], 'loop_lag': base['reference_lag'],
         'loop_gain': base['loop_gain'], 'loop_integral': base['loop_integral'],
+        'loop_forward_share': base['loop_feedforward'] / transmission,
         'traction_torque': base['grip_along'] * load * radius,
         'wheel_radius': radius, 'mass': base['mass'], 'yaw_inertia': base['yaw_inertia'],
         'wheel_inertia': base['wheel_inertia'],

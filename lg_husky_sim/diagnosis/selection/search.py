@@ -23,6 +23,7 @@ from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.elimination import eliminated
 from lg_husky_sim.diagnosis.selection.exchange import exchanged
 from lg_husky_sim.diagnosis.selection.laws import Laws
+from lg_husky_sim.diagnosis.selection.narrowing import narrowed
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.selection.recalibration import (
     as_logged,
@@ -33,7 +34,6 @@ from lg_husky_sim.diagnosis.selection.recalibration import (
     recalibrated,
 )
 from lg_husky_sim.diagnosis.selection.rounds import (
-    attempt,
     calibrated,
     forward_step,
     numbers_of,
@@ -42,6 +42,7 @@ from lg_husky_sim.diagnosis.selection.rounds import (
     with_jitter,
 )
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -130,16 +131,36 @@ def seeds_of(first: Evidence, rough: Fit, base: Fit, logged: Logged) -> list[Tri
 
 def _best_start(evidence: Evidence, base: Fit, begins: Sequence[tuple[
         Hypothesis, FloatArray, Numbers]]) -> tuple[Evidence, Hypothesis, Point] | None:
-    def fitted_from(begin: tuple[Hypothesis, FloatArray, Numbers]) -> Tried | None:
-        hypothesis, places, numbers = begin
+    # The likeliest of some effects, each from all its starts. Where they begin the model is off by
+    # many deviations, which have no weight then: first under noise as large as what is left.
+    starts = []
+    for hypothesis, places, numbers in begins:
         there = base.point.at(places)
-        return attempt(evidence, base, hypothesis, [
-            (there, start) for start in (numbers, *hypothesis.starts)], whole=False)
-    fits = evidence.pool.map(fitted_from, begins)
-    tried = [one for one in fits if one is not None]
-    if not tried:
+        more = narrowed(evidence, hypothesis, there)
+        starts += [(hypothesis, hypothesis.point(there, one)) for one in (
+            numbers, *hypothesis.starts, *([] if more is None else [more]))]
+    left = evidence.residuals(evidence.predict(base.point.at(begins[0][1]))) if begins else 0.0
+    inflation = max(1.0, float(np.sqrt(np.mean(np.square(left)))))
+
+    def fitted_from(start: tuple[Hypothesis, Point], rounds: int, wider: float) -> Fit | None:
+        try:
+            return evidence.fit(start[1], rounds=rounds, inflation=wider)
+        except LgHuskyError:
+            return None
+
+    def goes_on(start: tuple[Hypothesis, Point]) -> Fit | None:
+        rough = fitted_from(start, int(setting('whole_rounds')), inflation)
+        return rough and fitted_from((start[0], rough.point), int(setting('reading_rounds')), 1.0)
+    few = int(setting('whole_rounds'))
+    begun = evidence.pool.map(lambda start: fitted_from(start, few, inflation), starts)
+    ahead = sorted(((start[0], fit) for start, fit in zip(starts, begun, strict=True) if fit),
+                   key=lambda one: one[1].cost)[:int(setting('readings_finished'))]
+    ends = evidence.pool.map(goes_on, [(one, fit.point) for one, fit in ahead])
+    done = [Tried(one, fit, base.cost - fit.cost, evidence.count)
+            for (one, _), fit in zip(ahead, ends, strict=True) if fit]
+    if not done:
         return None
-    best = max(tried, key=lambda one: one.score)
+    best = max(done, key=lambda one: one.score)
     return evidence, best.hypothesis, best.fit.point
 
 
