@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -67,7 +68,14 @@ def test_what_a_law_is_off_by_is_no_further_effect(
             # Of what gains by a change, where the innovations have another one in them.
             there: Fit = replace(base, whitened=base.whitened + seen)
             other = replace(base, whitened=there.whitened - change)
-            return Laws(start, [found]).parts_left(evidence, there, [other])[0]
+            none, one = Laws(start, [found]).gains_left(
+                evidence, there, [other, other], [0.0, 1.0])
+            # Whatever it is, a part of 5 % of the change is no further effect.
+            plain = evidence.residuals(evidence.predict(start.at(base.point.places[:-1])))
+            whole = student.cost(plain) - student.cost(there.whitened)
+            assert none == pytest.approx(0.0 if exact else -0.0025 * whole)
+            assert exact or whole > 100.0
+            return one - none
         off = 0.1 * without * (rates / rates.max())
         assert part(biased, biased) > 0.9
         if exact:
@@ -91,4 +99,4 @@ def test_a_robot_that_runs_away_without_what_was_found_is_judged_all_the_same(
         evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
         base = evidence.fit(found.point(start, {'dead_voltage': 0.1}), rounds=0)
         monkeypatch.setattr(Evidence, 'predict', runs_away)
-        assert Laws(start, [found]).parts_left(evidence, base, [base]) == [1.0]
+        assert Laws(start, [found]).gains_left(evidence, base, [base], [7.0]) == [7.0]

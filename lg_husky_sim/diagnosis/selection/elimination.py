@@ -57,8 +57,8 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
                if unknown.name in {p.name for p in one.free}]
         # One of several is weighed beside the others; the last one was chosen among all.
         others = Laws(plain, [h for h in kept if h is not one])
-        part, = others.parts_left(evidence, fit, [final])
-        chance = chance_of(part * loss, one, 1 if len(kept) > 1 else every, evidence, dispersion(
+        left, = others.gains_left(evidence, fit, [final], [loss])
+        chance = chance_of(left, one, 1 if len(kept) > 1 else every, evidence, dispersion(
             evidence, final.whitened, final.jacobian[:, own]))
         if is_beyond_chance(chance):
             break

@@ -15,7 +15,9 @@ of what a further effect gains by the change d of the readings that it makes, th
 
     (d' V e)^2 / (d' V d)  over  (d' e)^2 / (d' d),   V = (I + s^2 M M')^-1
 
-where the numbers of the robot are projected out of all of them. Errors of sensors are exact.
+where the numbers of the robot are projected out of all of them. Whatever else a law may be off by:
+a part b of the change that it makes, root mean square, gains at most b^2 of what all of the change
+gains, which is no further effect. Errors of sensors are exact.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import probe_times
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -60,9 +63,10 @@ class Laws:
     plain: Point
     found: Sequence[Hypothesis]
 
-    def parts_left(self, evidence: Evidence, base: Fit, others: Sequence[Fit]) -> list[float]:
+    def gains_left(self, evidence: Evidence, base: Fit, others: Sequence[Fit],
+                   gains: Sequence[float]) -> list[float]:
         """
-        Return which part of its gain each further effect has where these laws may be off.
+        Return what each further effect gains where these laws may be off.
 
         Parameters
         ----------
@@ -72,26 +76,31 @@ class Laws:
             With what was found.
         others : sequence of Fit
             With one more effect each.
+        gains : sequence of float
+            What each gains if they are exact [nats].
 
         Returns
         -------
         list of float
-            From 0 to 1.
+            [nats]
 
         """
         exact = [h for h in self.found if h.effect.kind.subsystem is Subsystem.SENSOR]
         if len(exact) == len(self.found) or not others:
-            return [1.0] * len(others)
+            return list(gains)
         point = with_effects(self.plain, base.point, exact)
         try:
-            made = evidence.residuals(evidence.predict(point)) - base.whitened
+            without = evidence.residuals(evidence.predict(point))
         except LgHuskyError:
             # It runs away without them: there is nothing that they could be a part of.
-            return [1.0] * len(others)
+            return list(gains)
+        made = without - base.whitened
         columns = setting('law_off') * made[:, None] * _shapes(evidence, base)
         projection = Projection(base)
-        return [_part_left(projection, base.whitened - other.whitened, columns)
-                for other in others]
+        whole = max(student.cost(without) - student.cost(base.whitened), 0.0)
+        form = setting('form_off') ** 2 * whole
+        return [_part_left(projection, base.whitened - other.whitened, columns) * gain - form
+                for other, gain in zip(others, gains, strict=True)]
 
 
 def _shapes(evidence: Evidence, base: Fit) -> FloatArray:

@@ -273,10 +273,11 @@ def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[T
 def _lost(evidence: Evidence, base: Fit, tried: Sequence[Tried], laws: Laws | None
           ) -> list[float]:
     # What of its gain each has by an accident, or by what the laws of others are off by.
-    parts = [1.0] * len(tried) if laws is None else laws.parts_left(
-        evidence, base, [t.fit for t in tried])
-    return [accident(evidence, base.whitened, t.fit.whitened) + (1.0 - part) * t.gain
-            for t, part in zip(tried, parts, strict=True)]
+    gains = [t.gain for t in tried]
+    left = gains if laws is None else laws.gains_left(
+        evidence, base, [t.fit for t in tried], gains)
+    return [accident(evidence, base.whitened, t.fit.whitened) + t.gain - own
+            for t, own in zip(tried, left, strict=True)]
 
 
 def _chance(evidence: Evidence, tried: Tried, starts: int, once: float = 0.0) -> float:
