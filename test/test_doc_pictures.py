@@ -120,8 +120,13 @@ def test_the_table_of_the_real_diagnosis_is_that_of_its_picture() -> None:
     assert len(rows) == 5
     held = re.findall(r'^Held-out data, .+ recalibrated ([\d.]+), with finding ([\d.]+)$',
                       said('diagnosis.png'), re.MULTILINE)
-    known = {tuple(f'{float(value):.3g}' for value in row) for row in held}
-    assert {tuple(f'{float(value):.3g}' for value in row) for row in rows} <= known
+
+    def rounded(seen: str, value: str) -> bool:
+        # To the digits of the page, of a figure that is rounded to four itself.
+        last = 10.0 ** -len(seen.partition('.')[2])
+        return abs(float(seen) - float(value)) <= 0.5001 * last
+    for row in rows:
+        assert any(all(map(rounded, row, known)) for known in held), row
 
 
 @pytest.mark.parametrize('name', ['compare_tile_responses.png', 'compare_tile_trajectory.png'])
