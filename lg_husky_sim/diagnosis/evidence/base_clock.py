@@ -62,7 +62,7 @@ def _rates(plant: Plant, drive: Drive, log: Reading) -> Rates:
 
 
 def _without_pose(drive: Drive) -> Drive:
-    # What rates do not need takes a third of a simulation.
+    # Rates do not need it, and each of its times is a row of a simulation.
     kept = ~np.isin(drive.channels, _POSE)
     return replace(drive, pose_times=drive.pose_times[:0], heading=drive.heading[:0],
                    measured=drive.measured[kept], channels=drive.channels[kept],

@@ -16,8 +16,8 @@ of what a further effect gains by the change d of the readings that it makes, th
     (d' V e)^2 / (d' V d)  over  (d' e)^2 / (d' d),   V = (I + s^2 M M')^-1
 
 where the numbers of the robot are projected out of all of them. Whatever else a law may be off by:
-a part b of the change that it makes, root mean square, gains at most b^2 of what all of the change
-gains, which is no further effect. Errors of sensors are exact.
+a part b of the change that it makes, root mean square, gains b^2 of what all of the change gains
+if innovations are normal, which is no further effect. Errors of sensors are exact.
 """
 
 from __future__ import annotations

@@ -146,15 +146,16 @@ def _best_start(evidence: Evidence, base: Fit, begins: Sequence[tuple[
         try:
             return evidence.fit(start[1], rounds=rounds, inflation=wider)
         except LgHuskyError:
+            # It runs away from there.
             return None
 
     def goes_on(start: tuple[Hypothesis, Point]) -> Fit | None:
-        rough = fitted_from(start, int(setting('whole_rounds')), inflation)
-        return rough and fitted_from((start[0], rough.point), int(setting('reading_rounds')), 1.0)
-    few = int(setting('whole_rounds'))
+        rough = fitted_from(start, few, inflation)
+        return rough and fitted_from((start[0], rough.point), int(setting('seed_rounds')), 1.0)
+    few = int(setting('seed_start'))
     begun = evidence.pool.map(lambda start: fitted_from(start, few, inflation), starts)
     ahead = sorted(((start[0], fit) for start, fit in zip(starts, begun, strict=True) if fit),
-                   key=lambda one: one[1].cost)[:int(setting('readings_finished'))]
+                   key=lambda one: one[1].cost)[:int(setting('seeds_finished'))]
     ends = evidence.pool.map(goes_on, [(one, fit.point) for one, fit in ahead])
     done = [Tried(one, fit, base.cost - fit.cost, evidence.count)
             for (one, _), fit in zip(ahead, ends, strict=True) if fit]
