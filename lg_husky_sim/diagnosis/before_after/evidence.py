@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from lg_husky_sim.signals import FloatArray
@@ -29,6 +29,9 @@ class Quadratic:
     slope : numpy.ndarray, shape (n,)
     cost : float
         The constant c [nats].
+    lasting : mapping of int to float
+        By index of a limit that this recording only exceeds: the share of its curvature that is
+        left without the stretch that says most.
 
     """
 
@@ -38,6 +41,7 @@ class Quadratic:
     curvature: FloatArray
     slope: FloatArray
     cost: float = 0.0
+    lasting: Mapping[int, float] = field(default_factory=dict)
 
     def value(self, at: FloatArray) -> float:
         """Return the negative log likelihood at parameters [nats]."""
@@ -46,7 +50,9 @@ class Quadratic:
     def among(self, index: NDArray[np.intp]) -> Quadratic:
         """Return this for some of the parameters; it does not depend on the others."""
         return replace(self, place=self.place[index], slope=self.slope[index],
-                       curvature=self.curvature[np.ix_(index, index)])
+                       curvature=self.curvature[np.ix_(index, index)],
+                       lasting={i: self.lasting[k] for i, k in enumerate(index.tolist())
+                                if k in self.lasting})
 
     def less(self, shift: FloatArray) -> Quadratic:
         """Return this as a function of the parameters less a shift of them."""
@@ -54,14 +60,15 @@ class Quadratic:
         return replace(self, place=self.place - shift, slope=self.slope - moved,
                        cost=self.cost + float(0.5 * shift @ moved - self.slope @ shift))
 
-    def curved(self, k: int, at: float, least: float) -> Quadratic:
+    def curved(self, k: int, at: float, least: float, lasting: float) -> Quadratic:
         """Return this with so much curvature at least along a parameter, about a value of it."""
         more = max(least - float(self.curvature[k, k]), 0.0)
         curvature, slope = np.array(self.curvature), np.array(self.slope)
         curvature[k, k] += more
         slope[k] += more * at
         return replace(self, curvature=curvature, slope=slope,
-                       cost=self.cost + 0.5 * more * at ** 2)
+                       cost=self.cost + 0.5 * more * at ** 2,
+                       lasting={**self.lasting, k: lasting} if more > 0.0 else self.lasting)
 
     def flatter(self, k: int, by: float) -> Quadratic:
         """Return this with so many times the curvature along a parameter, about its place."""
@@ -71,6 +78,19 @@ class Quadratic:
         slope = curvature @ at - scale * (self.curvature @ at - self.slope)
         return replace(self, curvature=curvature, slope=slope,
                        cost=self.value(at) - float(0.5 * at @ curvature @ at - slope @ at))
+
+    def fading(self) -> Quadratic:
+        """Return this without the stretch that exceeds each of the limits the most."""
+        found = self
+        for k, share in self.lasting.items():
+            found = found.flatter(k, share)
+        return found
+
+    def only_exceeds(self, which: NDArray[np.intp]) -> bool:
+        """Return whether these are limits of which it tells only that it exceeds them."""
+        silent = np.diag(self.curvature)[which] == 0.0
+        return all(k in self.lasting or none for k, none in zip(
+            which.tolist(), silent, strict=True)) and not np.all(silent)
 
     def varying(self, sd: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Return curvature, slope and log evidence with the recording's own deviation."""
@@ -255,9 +275,19 @@ class Evidence:
         return tuple(replace(self, quadratics=[one for one in self.quadratics if one is not left])
                      for left in self.quadratics)
 
+    @cached_property
+    def without_a_stretch(self) -> tuple[Evidence, ...]:
+        """Return this without the stretch of each recording that exceeds limits the most."""
+        return tuple(replace(self, quadratics=[one.fading() if one is own else one
+                                               for one in self.quadratics])
+                     for own in self.quadratics)
+
     def told(self, changed: NDArray[np.intp], known: NDArray[np.intp]) -> float:
         """
         Return what parameters that differ gain over some of them by all but any one recording.
+
+        No accident makes a robot exceed its limits for all of a recording. One that tells nothing
+        else of what differs is left out but for the stretch that says most.
 
         Parameters
         ----------
@@ -271,9 +301,13 @@ class Evidence:
             to recording that all have; of all recordings where a set has but one [nats].
 
         """
+        claimed = np.setdiff1d(changed, known)
+        left = [fading if own.only_exceeds(claimed) else without
+                for own, without, fading in zip(self.quadratics, self.without_one,
+                                                self.without_a_stretch, strict=True)
+                ] if self.without_one else [self]
         return min(one.solve(changed).evidence - (
-            one.solve(known).evidence if known.size else one.nothing)
-            for one in self.without_one or (self,))
+            one.solve(known).evidence if known.size else one.nothing) for one in left)
 
     @cached_property
     def _varying(self) -> list[tuple[FloatArray, FloatArray, float]]:

@@ -15,7 +15,7 @@ from lg_husky_sim.diagnosis.before_after.base import Base
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.evidence import Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
-from lg_husky_sim.diagnosis.before_after.prediction import residual
+from lg_husky_sim.diagnosis.before_after.prediction import CHANNELS, residual
 from lg_husky_sim.diagnosis.before_after.whitening import Noise
 from lg_husky_sim.signals import FloatArray
 import numpy as np
@@ -27,8 +27,9 @@ def with_limits(base: Base, drives: Sequence[Drive], noise: Noise, prior: Prior,
     Return the quadratic of a recording with what the limits of the others would cost it.
 
     Where the lowest limit of all recordings, in place of its own, costs more than the derivatives
-    say, the curvature is as large as that. The highest one costs no more than none at all, with
-    all else as far from its place as recordings of one robot differ.
+    say, the curvature is as large as that: the recording exceeds it, and ``lasting`` is the share
+    of that cost that is left without the stretch that costs most. The highest one costs no more
+    than none at all, with all else as far from its place as recordings of one robot differ.
 
     Parameters
     ----------
@@ -54,25 +55,41 @@ def with_limits(base: Base, drives: Sequence[Drive], noise: Noise, prior: Prior,
     z, several = places[near.recording], np.array(list(places.values()))
     wide = np.hypot([q.recording for q in quantities], numbers['drawn_least'] * prior.sd)
 
-    def cost(at: FloatArray) -> float:
-        return 0.5 * sum(float(e @ e) for e in (
-            noise.white(residual(base, d, at), d.vigour) for d in drives))
-    here, upper = near.value(z), base.bounds()[1]
+    def costs(at: FloatArray) -> FloatArray:
+        return np.concatenate([_by_stretch(base, d, noise, at) for d in drives])
+    here, upper = costs(z), base.bounds()[1]
     for k, quantity in enumerate(quantities):
         if not prior.free[k] or quantity.name not in base.settings.limits:
             continue
         lower, higher = several[:, k].min() - z[k], several[:, k].max() - z[k]
         if -lower > prior.sd[k] * numbers['limit_apart']:
             there = np.where(np.arange(z.size) == k, z[k] + lower, z)
-            near = near.curved(k, z[k], 2.0 * (cost(there) - here) / lower ** 2)
+            more = costs(there) - here
+            whole, most = float(np.sum(more)), float(np.max(more))
+            if whole > 0.0:
+                near = near.curved(k, z[k], 2.0 * whole / lower ** 2,
+                                   max(1.0 - most / whole, 0.0))
         others = prior.free & (np.arange(z.size) != k)
         promised = 0.5 * _profile(near.curvature, k, others, wide) * higher ** 2
         if promised > numbers['enough']:
             about = Prior(np.where(others | ~prior.free, z, upper), wide, others)
             fit = fit_set(base, drives, about, noise, about.mean, int(numbers['steps']),
                           numbers['enough'], map)
-            near = near.flatter(k, float(np.clip((fit.cost - here) / promised, 0.0, 1.0)))
+            costs_more = fit.cost - float(np.sum(here))
+            near = near.flatter(k, float(np.clip(costs_more / promised, 0.0, 1.0)))
     return near
+
+
+def _by_stretch(base: Base, drive: Drive, noise: Noise, at: FloatArray) -> FloatArray:
+    # Negative log likelihood of each stretch of a drive.
+    found = np.zeros(int(drive.steps * base.settings.simulation['step']
+                         / base.settings.fit['block']) + 2)
+    for name, white in noise.by_channel(residual(base, drive, at), drive.vigour).items():
+        stream = next(one for one, names in CHANNELS.items() if name in names)
+        centres = drive.bins[stream].centres()[-white.size:]
+        found += np.bincount(((centres - drive.start) / base.settings.fit['block']).astype(
+            np.intp), 0.5 * white ** 2, found.size)
+    return found
 
 
 def _profile(curvature: FloatArray, k: int, others: np.typing.NDArray[np.bool_], wide: FloatArray

@@ -102,3 +102,30 @@ def test_a_set_of_one_recording_tells_by_all_of_them() -> None:
     evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.02), np.full(1, 0.1))
     changed, none = np.array([0]), np.zeros(0, dtype=np.intp)
     assert evidence.told(changed, none) == evidence.solve(changed).evidence - evidence.nothing
+
+
+@pytest.mark.parametrize('lasts', [True, False])
+def test_a_limit_that_one_recording_exceeds_in_most_of_its_stretches_is_told(lasts: bool) -> None:
+    """Of the robot before, one recording is slower than the limit that it has after."""
+    places, curvatures = [0.0, 3.9, -0.2, -0.2], [0.0, 1e3, 1e4, 1e4]
+    recordings = [recording(k, [place], np.array([[curvature]]), k > 1)
+                  for k, (place, curvature) in enumerate(zip(places, curvatures, strict=True))]
+    recordings[1] = replace(recordings[1], lasting={0: 0.8 if lasts else 0.0})
+    evidence = Evidence(recordings, np.zeros(1), np.ones(1), np.full(1, 0.05), np.full(1, 0.7))
+    changed, none = np.array([0]), np.zeros(0, dtype=np.intp)
+    gain = evidence.solve(changed).evidence - evidence.nothing
+    told = evidence.told(changed, none)
+    assert gain > 50.0
+    assert told > 0.7 * gain if lasts else told < 5.0
+
+
+def test_what_a_recording_tells_of_more_than_a_limit_it_tells_alone() -> None:
+    """It reaches one limit of two, and exceeds the other."""
+    recordings = [recording(k, (3.9, 0.5) if k == 1 else (-0.2, 0.0),
+                            np.diag([1e4 * (k > 0), 1e4 * (k == 1)]), k > 1) for k in range(4)]
+    recordings[1] = replace(recordings[1], lasting={0: 0.8})
+    evidence = Evidence(recordings, np.zeros(2), np.ones(2), np.full(2, 0.05), np.full(2, 0.7))
+    none = np.zeros(0, dtype=np.intp)
+    assert evidence.told(np.array([0]), none) > 50.0
+    assert evidence.told(np.array([0, 1]), none) < 5.0
+    assert evidence.told(np.array([1]), np.array([0])) < 5.0

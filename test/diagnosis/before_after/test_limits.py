@@ -46,16 +46,20 @@ def drive(limit: float) -> Drive:
         there, values=there.values - residual(BASE, one, at(limit))['wheels'])})
 
 
-def costs(true: float, found: float, other: float) -> tuple[float, float]:
-    """Return what another limit costs by the derivatives alone, and as it counts [nats]."""
+def likelihoods(true: float, found: float, other: float) -> tuple[Quadratic, Quadratic]:
+    """Return that by the derivatives alone, and as it counts beside another recording's limit."""
     one, z = drive(true), at(found)
     prior = Prior(BASE.start, BASE.sd, np.array([q.name not in KNOWN.runs_as
                                                  for q in KNOWN.quantities]))
     plain = quadratic(BASE, one, WHITE, z, prior)
-    counted = with_limits(BASE, [one], WHITE, prior, {'rec1': z, 'rec2': at(other)}, plain)
+    return plain, with_limits(BASE, [one], WHITE, prior, {'rec1': z, 'rec2': at(other)}, plain)
 
+
+def costs(true: float, found: float, other: float) -> tuple[float, float]:
+    """Return what another limit costs by the derivatives alone, and as it counts [nats]."""
     def cost(of: Quadratic) -> float:
-        return of.value(at(other)) - of.value(z)
+        return of.value(at(other)) - of.value(at(found))
+    plain, counted = likelihoods(true, found, other)
     return cost(plain), cost(counted)
 
 
@@ -76,3 +80,14 @@ def test_one_that_was_only_found_costs_no_more_than_none() -> None:
     promised, counted = costs(true=2.0, found=0.798, other=1.5)
     assert promised > 100.0
     assert counted < 0.05 * promised
+
+
+def test_a_limit_that_is_exceeded_twice_is_so_without_either_time() -> None:
+    """At 0.8 m/s from 0 s to 3 s and from 6 s to 9 s; stretches are 4 s long."""
+    _, counted = likelihoods(true=2.0, found=2.0, other=0.5)
+    assert 0.3 < counted.lasting[K] < 0.7
+
+
+def test_one_that_is_reached_is_not_exceeded() -> None:
+    _, counted = likelihoods(true=0.6, found=0.6, other=0.63)
+    assert K not in counted.lasting
