@@ -237,8 +237,8 @@ class Comparison:
     def _repr_html_(self) -> str:
         return page_part('Comparison', ['Errors are measured minus predicted.'], [self.table()], {
             **{one.where: one.sentences for one in self.what_to_change.advice()},
-            'Notes': [note for outcome in self.outcomes
-                      for note in (*outcome.recording.notes, *outcome.gaps())]})
+            'Notes': [f'{outcome.recording.name}: {note}' for outcome in self.outcomes
+                      for note in outcome.remarks()]})
 
 
 def compare(recordings: Recordings, models: Models = None, *, rivals: Recordings = (),

@@ -10,6 +10,7 @@ import math
 
 from lg_husky_sim.comparison.metrics import (
     channel_errors,
+    measured_channels,
     pooled,
     SquareSum,
     Tracking,
@@ -19,6 +20,7 @@ from lg_husky_sim.comparison.metrics import (
 from lg_husky_sim.comparison.models import NamedPlant
 from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.rival import rival_prediction
+from lg_husky_sim.comparison.scatter import counts, scatter_note, scatter_of
 from lg_husky_sim.errors import CommandError, RecordingError
 from lg_husky_sim.recording import Recording, Segment, segments, windows
 from lg_husky_sim.recording.names import printable
@@ -72,6 +74,23 @@ class RecordingOutcome:
         if not known:
             return math.nan, math.nan
         return max(pair[0] for pair in known), max(pair[1] for pair in known)
+
+    def scatter(self) -> float:
+        """Return the scatter of the forward speed [m/s] where errors are mostly that; else 0."""
+        speeds = [one['forward'] for one in (measured_channels(part.segment)
+                                             for part in self.segments) if 'forward' in one]
+        errors = [self.errors(name) for name in labels([self])]
+        known = [one['forward'].rmse for one in errors if 'forward' in one]
+        if not speeds or not known:
+            return 0.0
+        scatter = scatter_of(np.concatenate([one.times for one in speeds]),
+                             np.concatenate([one.column('forward') for one in speeds]))
+        return scatter if counts(scatter, min(known)) else 0.0
+
+    def remarks(self) -> list[str]:
+        """Return what to know of the recording and of its errors, in sentences."""
+        scatter = self.scatter()
+        return [*self.recording.notes, *self.gaps(), *[scatter_note(scatter)] * bool(scatter)]
 
     def gaps(self) -> list[str]:
         """Return a sentence for each model or rival whose errors are over a part of the drive."""
@@ -209,7 +228,7 @@ def text_table(outcomes: Sequence[RecordingOutcome]) -> str:
             for place, axis in enumerate(('|X| [m]', '|Y| [m]')):
                 cells = ''.join(f'{_number(bounds[name][place]):>{width}}' for name in names)
                 lines.append(f'  {axis:<28}{cells}')
-        lines += [f'  {gap}' for gap in outcome.gaps()]
+        lines += [f'  note: {note}' for note in outcome.remarks()]
         lines.append('')
     return '\n'.join(lines)
 
@@ -235,7 +254,7 @@ def as_json(
         'recordings': [{
             'name': outcome.recording.name,
             'path': printable(outcome.recording.path),
-            'notes': [*outcome.recording.notes, *outcome.gaps()],
+            'notes': outcome.remarks(),
             'results': {name: {'rmse': _rmse(outcome.errors(name)),
                                'samples': {channel: one.count for channel, one
                                            in outcome.errors(name).items()},

@@ -12,7 +12,6 @@ from pathlib import Path
 
 from lg_husky_sim.comparison.models import NamedPlant
 from lg_husky_sim.comparison.outcome import labels, RANKED, RecordingOutcome
-from lg_husky_sim.comparison.scatter import scatter_note, scatter_of, SHARE
 from lg_husky_sim.comparison.traces import error_table, Predicted, recording_tables, traces_of
 from lg_husky_sim.recording.names import printable
 from lg_husky_sim.reporting.data import (
@@ -21,7 +20,6 @@ from lg_husky_sim.reporting.data import (
     Headline,
     Provenance,
     ReportData,
-    Trace,
 )
 from lg_husky_sim.reporting.words import (
     capitalised,
@@ -32,7 +30,6 @@ from lg_husky_sim.reporting.words import (
     with_unit,
 )
 from lg_husky_sim.reporting.write import view_of, write_report
-import numpy as np
 
 MARKER = 'compare.json'
 """File that tells a folder of comparisons."""
@@ -129,10 +126,9 @@ def report_data(
     if settings:
         notes.append('Set in every model: ' + ', '.join(
             f'`{name} = {value:g}`' for name, value in settings.items()) + '.')
-    scattered = _scatters(traces)
-    notes += [scatter_note(name, scatter) for name, scatter in scattered.items()]
+    scattered = {outcome.recording.name for outcome in outcomes if outcome.scatter()}
     notes += [f'{outcome.recording.name}: {note}' for outcome in outcomes
-              for note in (*outcome.recording.notes, *outcome.gaps())]
+              for note in outcome.remarks()]
     names = ', '.join(outcome.recording.name for outcome in outcomes)
     data = ReportData(
         f'Comparison with {names}', _headline(tables[0], len(outcomes), seconds), columns,
@@ -169,15 +165,3 @@ def _headline(table: ErrorTable, recordings: int, seconds: float) -> Headline:
         sentences=(f'Its root mean square {quantity(key)} error is '
                    f'{with_unit(values[best], unit)}; that of the next is '
                    f'{with_unit(second, unit)}.',))
-
-
-def _scatters(traces: Sequence[Trace]) -> dict[str, float]:
-    """Return by recording the scatter [m/s] of a forward speed that is noise for a good part."""
-    found = {}
-    for trace in (one for one in traces if one.channel == 'forward'):
-        scatter = scatter_of(trace.times, trace.measured)
-        errors = [trace.measured - values for values in trace.predicted.values()]
-        if errors and scatter > SHARE * min(
-                float(np.sqrt(np.nanmean(error ** 2))) for error in errors):
-            found[trace.recording] = scatter
-    return found

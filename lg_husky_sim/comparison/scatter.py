@@ -15,6 +15,8 @@ import numpy as np
 
 #: Share of the error of the forward speed from which the scatter of the pose is worth a note.
 SHARE = 0.3
+#: A model that misses a speed by less than this share of its scatter follows bends, not noise.
+FOLLOWED = 0.5
 
 
 def scatter_of(times: FloatArray, forward: FloatArray) -> float:
@@ -42,11 +44,31 @@ def scatter_of(times: FloatArray, forward: FloatArray) -> float:
     return float(np.median(np.abs(bends))) / 0.6745 / math.sqrt(6.0) if bends.size else math.nan
 
 
-def scatter_note(name: str, scatter: float) -> str:
+def counts(scatter: float, least: float) -> bool:
+    """
+    Return whether a scatter is a good part of the errors of all models.
+
+    Parameters
+    ----------
+    scatter : float
+        Of the measured forward speed [m/s].
+    least : float
+        Smallest error of a model's forward speed [m/s].
+
+    Returns
+    -------
+    bool
+        False also where a model misses the speed by much less: commands do not foretell noise.
+
+    """
+    return SHARE * least < scatter <= least / FOLLOWED
+
+
+def scatter_note(scatter: float) -> str:
     """Return in a sentence how much the forward speed of a recording scatters [m/s]."""
-    return (f'{name}: the measured forward speed is the rate of change of the pose, and has a '
+    return ('the measured forward speed is the rate of change of the pose, and has a '
             f'scatter of at least {number(scatter, 2)} m/s of its own: that part of its error '
-            'is not due to a model.')
+            'is not due to a model')
 
 
 def scatter_notes(segments: Sequence[Segment], least: float) -> tuple[str, ...]:
@@ -71,6 +93,6 @@ def scatter_notes(segments: Sequence[Segment], least: float) -> tuple[str, ...]:
                  if one.recording == name and 'pose' in one.streams]
         sizes = [scatter_of(one.times, one.column('forward')) for one in rates]
         known = [size for size in sizes if math.isfinite(size)]
-        if known and float(np.median(known)) > SHARE * least:
+        if known and counts(float(np.median(known)), least):
             found[name] = float(np.median(known))
-    return tuple(scatter_note(name, size) for name, size in found.items())
+    return tuple(f'{name}: {scatter_note(size)}' for name, size in found.items())

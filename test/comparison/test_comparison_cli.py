@@ -307,9 +307,12 @@ def test_a_page_does_not_begin_with_the_scatter_of_a_pose() -> None:
     noise = np.random.default_rng(2).normal(0.0, 0.05, pose.values.shape) * (1.0, 1.0, 0.0)
     noisy = replace(drive, streams={**drive.streams, 'pose': TimeSeries(
         pose.times, pose.values + noise, pose.names)})
-    pages = [report_data(found.outcomes, found.plants)
-             for found in (lg.compare(drive), lg.compare(noisy))]
-    assert [sum('has a scatter of at least' in note for note in page.notes)
-            for page in pages] == [0, 1]
+    compared = lg.compare(drive), lg.compare(noisy)
+    pages = [report_data(found.outcomes, found.plants) for found in compared]
+    said = 'has a scatter of at least'
+    assert [sum(said in note for note in page.notes) for page in pages] == [0, 1]
+    # Whoever reads the terminal or the JSON only is told, too.
+    for text in (str, lambda found: json.dumps(found.data()), lambda found: found._repr_html_()):
+        assert [text(found).count(said) for found in compared] == [0, 1]
     assert all(page.view is not None for page in pages)
     assert pages[1].view.channel != 'forward'  # type: ignore[union-attr]

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from lg_husky_sim.comparison.scatter import scatter_notes, scatter_of
+import math
+
+from lg_husky_sim.comparison.scatter import counts, scatter_notes, scatter_of
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
@@ -36,3 +38,12 @@ def test_a_recording_whose_speed_is_mostly_noise_is_named() -> None:
     # A model that is far off, and a pose that is exact, are another matter.
     assert not scatter_notes([grass(NOISE)], 5.0)
     assert not scatter_notes([grass(0.0)], 0.2)
+
+
+def test_a_speed_that_a_model_foretells_does_not_scatter() -> None:
+    """Commands do not foretell noise: where a model is that near, the speed itself bends so."""
+    scatter = 0.2
+    assert counts(scatter, 0.9 * scatter)
+    assert not counts(scatter, 1e-3 * scatter)
+    assert not counts(math.nan, 1.0)
+    assert not scatter_notes([grass(NOISE)], 1e-6)
