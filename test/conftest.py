@@ -120,6 +120,8 @@ addEventListener('load', async () => {
   for (let k = 0; k < 100 && !$('plot-signals')?.data; k += 1) await wait(100);
   seen.alive = document.body.classList.contains('alive');
   seen.size = [document.documentElement.scrollWidth, innerWidth];
+  seen.cut = [...document.querySelectorAll('.wide')].map(
+    (one) => one.scrollWidth - one.clientWidth);
   seen.dark = getComputedStyle(document.body).backgroundColor;
   seen.plots = [...document.querySelectorAll('.js-plotly-plot')].map(
     (one) => one.getBoundingClientRect().right);

@@ -60,7 +60,8 @@ def summary_text(diagnosis: Diagnosis, changed: bool = False) -> str:
         Headline, findings, competing effects, what cannot be told apart, errors before and after.
 
     """
-    lines = [f'{headline(diagnosis, changed)} (confidence {diagnosis.confidence:.2f})',
+    answer = headline(diagnosis, changed).removesuffix('.')
+    lines = [f'{answer} (confidence {diagnosis.confidence:.2f})',
              *(f'  warning: {text}' for text in diagnosis.warnings)]
     for finding in diagnosis.findings:
         name = '' if finding.effect == 'unknown' else f'{finding.effect}: '

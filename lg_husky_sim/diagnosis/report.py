@@ -35,6 +35,7 @@ from lg_husky_sim.reporting.data import (
 from lg_husky_sim.reporting.sections import Cell, Section, Table, Tone
 from lg_husky_sim.reporting.words import (
     capitalised,
+    in_a_row,
     number,
     with_interval,
     with_unit,
@@ -360,7 +361,7 @@ def report_data(
     columns = tuple(name for name in (NOMINAL, RECALIBRATED, WITH_FINDING)
                     if any(name in table.columns for table in errors)
                     or any(name in trace.predicted for trace in traces))
-    what = ' and '.join(effect_words(one) for one in diagnosis.findings)
+    what = in_a_row(list(dict.fromkeys(effect_words(one) for one in diagnosis.findings)))
     about = {NOMINAL: 'the model as it was given',
              RECALIBRATED: 'its parameters refitted within their tolerances, nothing added',
              WITH_FINDING: f'refitted with {what}'

@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.error_tables import error_tables, with_details
 from lg_husky_sim.diagnosis.held_out import stretches_of
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES
 from lg_husky_sim.diagnosis.localisation import Missing, missing_efforts, strengths
-from lg_husky_sim.diagnosis.nameless import needed_evidence
+from lg_husky_sim.diagnosis.nameless import needed_evidence, WHERE
 from lg_husky_sim.diagnosis.planning import named_drive
 from lg_husky_sim.diagnosis.report import report_data
 from lg_husky_sim.diagnosis.settings import setting
@@ -180,9 +180,9 @@ def _efforts(efforts: Sequence[Missing], shares: Mapping[str, float]) -> list[Ch
         own = [e for e in efforts if e.balance == balance]
         one = max(own, key=lambda e: float(np.mean((e.values / np.maximum(
             e.deviations, 1e-12)) ** 2)))
-        name, unit = balance.replace('_', ' '), BALANCES[balance][4]
+        name, unit = WHERE[balance][0].removeprefix('a '), BALANCES[balance][4]
         charts.append(Chart(
-            f'effort_{place + 1}', f'Missing {name} in {one.drive.recording}', (Line(
+            f'effort_{place + 1}', f'Missing {name}; recording {one.drive.recording}', (Line(
                 name, one.times, one.values, 2.0 * one.deviations),), 'time [s]', f'[{unit}]'))
     return charts
 

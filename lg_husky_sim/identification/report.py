@@ -203,7 +203,8 @@ def _headline(result: FitResult, table: ErrorTable) -> Headline:
         return Headline(f'Not converged: {count} of {plural(len(result.recordings), "recording")}',
                         Tone.BAD, _facts(result, bound), (), tuple(warnings))
     return Headline(f'{count} estimated from {plural(len(result.recordings), "recording")}',
-                    Tone.BAD if bound else Tone.GOOD, (*_gain(table), *_facts(result, bound)),
+                    Tone.BAD if bound else Tone.PLAIN if warnings else Tone.GOOD,
+                    (*_gain(table), *_facts(result, bound)),
                     (), tuple(warnings))
 
 

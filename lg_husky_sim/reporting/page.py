@@ -24,6 +24,7 @@ from lg_husky_sim.reporting.sections import Cell, Table, Tone
 from lg_husky_sim.reporting.words import (
     capitalised,
     change,
+    digits_apart,
     number,
     padded,
     quantity,
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
 #: Mismatches in the table of a page; all of them are in the JSON file.
 MOST_MISMATCHES = 15
+#: Digits of an estimate that differs from the ends of its interval in none before.
+MOST_DIGITS = 8
 #: Errors [SI] that are all but zero: no sensor of a robot tells two of them apart.
 NEGLIGIBLE = 1e-3
 
@@ -135,7 +138,8 @@ def parameter_rows(rows: Sequence[ParameterRow]) -> list[dict[str, Any]]:
 def _parameter(one: ParameterRow) -> dict[str, Any]:
     known = math.isfinite(one.low) and math.isfinite(one.high)
     drawn = math.isfinite(one.least) and math.isfinite(one.most) and one.most > one.least
-    interval = f'{number(one.low, 4)} to {number(one.high, 4)}' if known else '–'
+    digits = max(4, min(MOST_DIGITS, digits_apart(one.value, one.low, one.high))) if known else 4
+    interval = f'{number(one.low, digits)} to {number(one.high, digits)}' if known else '–'
 
     def at(value: float) -> float:
         share = 100.0 * (value - one.least) / (one.most - one.least)
@@ -149,7 +153,7 @@ def _parameter(one: ParameterRow) -> dict[str, Any]:
                            f'{number(one.most)}'}
     moved = change(1.0, one.value / one.nominal, 1) if one.nominal else UNKNOWN
     return {'name': breakable(one.name), 'nominal': number(one.nominal, 4),
-            'value': number(one.value, 4), 'interval': interval,
+            'value': number(one.value, digits), 'interval': interval,
             'unit': '' if one.unit == '1' else one.unit, 'at_bound': one.at_bound,
             'change': moved, 'drawn': drawn, **places}
 
@@ -162,9 +166,13 @@ def _mismatches(shown: Sequence[Mismatch], jumps: Mapping[int, int]) -> list[dic
 
 
 def jumps_of(data: ReportData) -> dict[int, int]:
-    """Return which mismatches of the table can be shown: their place by a number of its own."""
+    """
+    Return which mismatches of the table can be shown: their place by a number of its own.
+
+    Those of a quantity without a signal of its own (heading) show when they were in the others.
+    """
     able = [place for place, one in enumerate(data.mismatches[:MOST_MISMATCHES])
-            if data.trace(one.recording, one.channel) is not None]
+            if one.recording in data.recordings]
     return dict(enumerate(able))
 
 

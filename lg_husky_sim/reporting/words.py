@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 import math
 import sys
 
@@ -58,6 +58,13 @@ def capitalised(text: str) -> str:
 def plural(count: int, noun: str) -> str:
     """Return a count with its noun, as in ``1 recording`` and ``2 recordings``."""
     return f'{count} {noun}{"" if count == 1 else "s"}'
+
+
+def in_a_row(names: Sequence[str]) -> str:
+    """Return names with commas and a word before the last: ``a and b``, ``a, b, and c``."""
+    if len(names) < 3:
+        return ' and '.join(names)
+    return f'{", ".join(names[:-1])}, and {names[-1]}'
 
 
 def number(value: float, digits: int = 3) -> str:

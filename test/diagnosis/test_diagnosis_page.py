@@ -56,6 +56,11 @@ def test_a_finding_without_rivals_says_so_in_plain_words() -> None:
     assert 'competing effects: none that predicts better' in said
 
 
+def test_the_first_line_is_one_sentence_with_its_confidence() -> None:
+    first, *_ = summary_text(_diagnosis(Verdict.KNOWN, RIPPLE), False).splitlines()
+    assert first == 'Missing effect found: torque ripple, left side (confidence 0.93)'
+
+
 def test_errors_of_a_tried_base_are_written_with_the_same_digits() -> None:
     base = CommercialBase(load_model(), {'dead_time': 0.0, 'slew_forward': 1.0, 'slew_yaw': 2.0})
     said = _said(base, True, {'wheel_speed_rmse': 3.21}, {'wheel_speed_rmse': 3.0})

@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 from pathlib import Path
 from typing import Any
 
 from lg_husky_sim.reporting.data import (
     diagnosis_trace,
+    ErrorRow,
+    ErrorTable,
     Headline,
     Mismatch,
     NOMINAL,
@@ -43,8 +46,14 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a report of two recordings, one of an odd name."""
     folder = tmp_path_factory.mktemp('report')
     line = Line('yaw moment', np.linspace(0.0, END, 9), np.arange(9.0), np.ones(9))
+    columns = (NOMINAL, RECALIBRATED, WITH_FINDING)
+    rows = tuple(ErrorRow(name, dict(zip(columns, (0.00881, 0.00327, 4.54e-7), strict=True)),
+                          low, high)
+                 for name, low, high in (('forward acceleration [m/s²]', 1e-4, 2e-4),
+                                         ('largest |X| error [m]', math.nan, math.nan)))
     write_report(ReportData(
-        'Diagnosis', Headline('Missing effect found'), (NOMINAL, RECALIBRATED, WITH_FINDING),
+        'Diagnosis', Headline('Missing effect found'), columns,
+        errors=(ErrorTable('All data', rows, columns, compared=(RECALIBRATED, WITH_FINDING)),),
         traces=tuple(_trace(recording, channel) for recording in ('rec1', HOSTILE)
                      for channel in ('wheel_left', 'yaw_rate', 'x', 'y')),
         mismatches=(Mismatch(HOSTILE, 'yaw_rate', 10.0, 14.0, 5.0, 'rotation'),
@@ -107,6 +116,7 @@ def test_the_path_is_coloured_by_the_error_of_the_chosen_model(seen: dict[str, A
 def test_a_page_fits_a_phone_in_light_and_dark(dark: bool, page: Path, visited: Visited) -> None:
     seen = visited(page, width=390, dark=dark)
     assert seen['size'] == [390, 390]
+    assert seen['cut'][0] == 0  # the change of the errors is in sight
     assert max(seen['plots']) <= 390.0  # a plot is drawn for the screen that it is on
     shade = [int(part) for part in seen['dark'].strip('rgb()').split(',')[:3]]
     assert max(shade) < 64 if dark else min(shade) > 192

@@ -26,7 +26,7 @@ from lg_husky_sim.reporting.data import (
     Trace,
     WITH_FINDING,
 )
-from lg_husky_sim.reporting.page import code, error_cells, parameter_rows, said
+from lg_husky_sim.reporting.page import code, error_cells, jumps_of, parameter_rows, said
 from lg_husky_sim.reporting.sections import Cell, Drawing, Section, Tone
 from lg_husky_sim.reporting.write import write_report
 import numpy as np
@@ -194,6 +194,21 @@ def test_a_parameter_is_drawn_within_what_the_fit_allows() -> None:
     (typed,) = parameter_rows([ParameterRow('wheel_damping', '1', 1.0, 2.0)])
     assert typed['name'] == 'wheel_<wbr>damping'
     assert free['interval'] == '–'
+
+
+def test_an_interval_has_digits_that_tell_it_from_the_estimate() -> None:
+    (near,) = parameter_rows([ParameterRow('side_gain_ratio', '1', 1.0, 1.00003, 0.99984, 1.0002)])
+    assert (near['value'], near['interval']) == ('1', '0.99984 to 1.0002')
+    (exact,) = parameter_rows([ParameterRow('wheel_radius', 'm', 0.1651, 0.1651, 0.1651, 0.1651)])
+    assert exact['interval'] == '0.1651 to 0.1651'
+
+
+def test_any_mismatch_of_a_recording_with_signals_can_be_shown() -> None:
+    """That of the heading has no signal of its own, but a time."""
+    data = _data(mismatches=tuple(Mismatch(recording, channel, 1.0, 2.0, 5.0, '') for recording,
+                                  channel in (('rec1', 'wheel_left'), ('rec1', 'heading'),
+                                              ('elsewhere', 'heading'))))
+    assert jumps_of(data) == {0: 0, 1: 1}
 
 
 def test_backquotes_are_code_and_escaped() -> None:

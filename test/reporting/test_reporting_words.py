@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from lg_husky_sim.reporting.advice import filled
-from lg_husky_sim.reporting.words import change, with_interval
+from lg_husky_sim.reporting.words import change, in_a_row, with_interval
 import pytest
 
 
@@ -21,6 +21,14 @@ import pytest
 def test_an_estimate_differs_from_the_ends_of_its_interval(
         estimate: tuple[float, float, float, str], text: str) -> None:
     assert with_interval(*estimate) == text
+
+
+def test_names_in_a_row_can_be_told_apart() -> None:
+    """Names of effects have an `or` and an `and` of their own."""
+    assert in_a_row(['slope']) == 'slope'
+    assert in_a_row(['slope', 'payload']) == 'slope and payload'
+    assert in_a_row(['limit or lag', 'belts', 'payload']) == 'limit or lag, belts, and payload'
+    assert in_a_row([]) == ''
 
 
 def test_a_word_stands_behind_the_unit() -> None:
