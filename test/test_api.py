@@ -271,6 +271,9 @@ def test_a_fit_recovers_what_drove_and_shows_itself(drive: Path, tmp_path: Path)
     assert page.index('<h2>What to change</h2>') < page.index('<h2>Parameters</h2>')
     assert 'model:=fit.yaml' in page
     assert fit.what_to_change.errors == ()
+    # A folder, as those of a comparison and of a diagnosis, or a model file.
+    assert fit.report(tmp_path / 'fitted') == tmp_path / 'fitted' / 'fit.html'
+    assert fit.report(tmp_path / 'heavy.yaml') == tmp_path / 'heavy.html'
 
 
 def test_a_fit_says_what_still_differs_from_it(drive: Path) -> None:

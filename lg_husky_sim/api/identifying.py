@@ -22,7 +22,7 @@ from lg_husky_sim.errors import FitError
 from lg_husky_sim.extras import require
 from lg_husky_sim.identification.estimate import estimate
 from lg_husky_sim.identification.options import with_effects
-from lg_husky_sim.identification.report import write_fit
+from lg_husky_sim.identification.report import ENDINGS, write_fit
 from lg_husky_sim.identification.result import FitResult, Method
 from lg_husky_sim.reporting.provenance import provenance
 
@@ -154,9 +154,9 @@ class Fit:
                          provenance(self.sources), self.what_to_change.advice())
 
     def report(self, path: PathLike | None = None) -> Path:
-        """Write everything, into a temporary folder by default; return the page."""
-        place = path or Path(tempfile.mkdtemp(prefix='lg_husky_fit.')) / 'fit.yaml'
-        return self.save(place)[-1]
+        """Write everything into a folder, a temporary one by default; return the page."""
+        place = Path(path or tempfile.mkdtemp(prefix='lg_husky_fit.'))
+        return self.save(place if place.suffix in ENDINGS else place / 'fit.yaml')[-1]
 
     def __str__(self) -> str:
         """Return the report as text."""

@@ -51,6 +51,9 @@ from lg_husky_sim.reporting.write import drawn, view_of
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
+#: How the name of a model file may end.
+ENDINGS = ('.yaml', '.yml')
+
 
 def report_paths(out: Path) -> tuple[Path, ...]:
     """
@@ -67,7 +70,7 @@ def report_paths(out: Path) -> tuple[Path, ...]:
         If it does not, or something is there that is no earlier fit.
 
     """
-    if out.suffix not in ('.yaml', '.yml'):
+    if out.suffix not in ENDINGS:
         raise SettingsError(f'{out}: a model file ends in .yaml or .yml')
     text, data, html = (out.with_suffix(end) for end in ('.txt', '.json', '.html'))
     check_ours(data, f'{{\n "schema": "{SCHEMA}"')
