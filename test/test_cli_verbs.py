@@ -82,6 +82,16 @@ def test_the_catalogue_is_listed_without_making_a_mistake() -> None:
     assert '  left, right  ' in said
 
 
+def test_an_effect_says_what_shows_it_and_what_to_change() -> None:
+    said = run('effects', 'coulomb_drivetrain').output
+    assert 'Drives that bring it out\n  - ' in said
+    assert 'turn the wheels by hand (<where>): <dry_torque> N·m of dry friction' in said
+    assert '`friction` in the URDF' in said
+    assert '<code>friction</code>' in lg.list_effects('coulomb_drivetrain').html()
+    assert all('{' not in str(lg.list_effects(name)) for name in catalogue())
+    assert '<limit_yaw>' in drawn(lg.list_effects('command_limit'), 80)
+
+
 def test_manoeuvres_and_parameters_are_listed(tmp_path: Path) -> None:
     assert {row['manoeuvre'] for row in json.loads(run('manoeuvres', '--json').output)} == set(
         builtin_manoeuvres())

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import re
+
 from lg_husky_sim.api.recordings import PathLike
 from lg_husky_sim.api.robots import as_husky, Husky
 from lg_husky_sim.api.tables import Table
@@ -13,7 +15,7 @@ from lg_husky_sim.manoeuvres import builtin_manoeuvres
 
 def list_effects(name: str | None = None, model: PathLike | Husky | None = None) -> Table:
     """
-    List the catalogue of effects, or the parameters of one.
+    List the catalogue of effects, or the parameters of one and what to do about it.
 
     Parameters
     ----------
@@ -43,7 +45,17 @@ def list_effects(name: str | None = None, model: PathLike | Husky | None = None)
                  ('parameter', 'unit', 'typical', 'lower', 'upper', 'estimated', 'source'),
                  tuple((p.name, p.unit, p.starts[0], p.lower, p.upper,
                         not p.fixed, p.source)
-                       for p in (one.of(robot) for one in kind.parameters)))
+                       for p in (one.of(robot) for one in kind.parameters)), {
+        'Drives that bring it out': kind.manoeuvres,
+        'Sensors that see it directly': kind.sensors,
+        'On the robot, where it is found': tuple(map(_open, kind.advice.robot)),
+        'In the simulator': tuple(map(_open, kind.advice.simulator)),
+        'Parameters of sim_node that do nearly the same': tuple(map(_open, kind.advice.instead))})
+
+
+def _open(sentence: str) -> str:
+    # What a finding fills in, as <dry_torque>.
+    return re.sub(r'{(\w+)[^}]*}', r'<\1>', sentence)
 
 
 def _words(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 import math
 import re
@@ -41,12 +41,15 @@ class Table:
     columns : tuple of str
     rows : tuple of tuple
         Texts, numbers, booleans and tuples of texts; None where there is none.
+    notes : mapping of str to tuple of str
+        Sentences below it by their heading.
 
     """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[object, ...], ...]
+    notes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def flush(self) -> list[bool]:
         """Return which columns hold numbers only and are set flush right."""
@@ -61,9 +64,14 @@ class Table:
         lines = ['  '.join(text.rjust(width) if flush else text.ljust(width)
                            for text, width, flush in zip(row, widths, right, strict=True)
                            ).rstrip() for row in cells]
-        return '\n'.join([self.title] * bool(self.title) + lines)
+        return '\n'.join([*[self.title] * bool(self.title), *lines, *self.remarks()])
 
     __repr__ = __str__
+
+    def remarks(self) -> list[str]:
+        """Return the notes as lines of text."""
+        return [line for heading, items in self.notes.items() if items
+                for line in ('', heading, *(f'  - {item}' for item in items))]
 
     def html(self) -> str:
         """Return the table as HTML; every text in it is escaped."""
@@ -74,7 +82,8 @@ class Table:
             f'<td style="text-align:{side}">{escape(cell(value))}</td>'
             for value, side in zip(row, sides, strict=True)) + '</tr>' for row in self.rows)
         title = f'<caption>{escape(self.title)}</caption>' if self.title else ''
-        return (f'<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>')
+        table = f'<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+        return table + _lists(self.notes)
 
     _repr_html_ = html
 
@@ -101,6 +110,14 @@ def _code(text: str) -> str:
     return re.sub('`([^`]*)`', r'<code>\1</code>', escape(text))
 
 
+def _lists(points: Mapping[str, Sequence[str]]) -> str:
+    # Lists as HTML, by their heading; empty ones are left out.
+    return ''.join(
+        f'<p><b>{escape(heading)}</b></p><ul>'
+        + ''.join(f'<li>{_code(item)}</li>' for item in items) + '</ul>'
+        for heading, items in points.items() if items)
+
+
 def page_part(title: str, lines: Sequence[str], tables: Sequence[Table],
               points: Mapping[str, Sequence[str]] | None = None) -> str:
     """
@@ -120,8 +137,4 @@ def page_part(title: str, lines: Sequence[str], tables: Sequence[Table],
     """
     parts = [f'<h4>{escape(title)}</h4>', *(f'<p>{escape(line)}</p>' for line in lines),
              *(table.html() for table in tables if table.rows)]
-    for heading, items in (points or {}).items():
-        if items:
-            parts.append(f'<p><b>{escape(heading)}</b></p><ul>' + ''.join(
-                f'<li>{_code(item)}</li>' for item in items) + '</ul>')
-    return '<div class="lg-husky">' + ''.join(parts) + '</div>'
+    return '<div class="lg-husky">' + ''.join(parts) + _lists(points or {}) + '</div>'

@@ -49,6 +49,8 @@ def print_table(table: Table, console: Any) -> None:
         console.print(Text(table.title, 'bold'), soft_wrap=True)
     console.width = max(_room(widths), console.width)
     console.print(grid)
+    for line in table.remarks():
+        console.print(Text(line), soft_wrap=True)
 
 
 def marked(text: str) -> Any:
