@@ -359,3 +359,17 @@ def test_lines_of_progress_name_each_stage_once() -> None:
     assert [line.split()[-1] for line in lines] == ['reading', 'fitting']
     with shown(False) as silent:
         silent('nothing', 0.5)
+
+
+def test_lines_of_progress_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A genetic algorithm has a hundred generations, and a log is no place for all of them."""
+    now: list[float] = [0.0]
+    lines: list[str] = []
+    monkeypatch.setattr('lg_husky_sim.api.progress.time.monotonic', lambda: now[0])
+    report = Lines(lines.append)
+    for generation in range(100):
+        now[0] = 0.1 * generation
+        report(f'generation {generation}, {100.0 / (1 + generation):.4g} m', None)
+    report('noise', None)
+    assert [line.split(maxsplit=2)[-1] for line in lines] == [
+        'generation 0, 100 m', 'generation 50, 1.961 m', 'noise']

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
+import re
 import sys
 import time
 from typing import Any, TypeAlias
@@ -17,6 +18,8 @@ Report: TypeAlias = Callable[[str, float | None], None]
 Shown: TypeAlias = bool | Report
 """True: shown where someone watches; False: never; or a function that is told."""
 
+#: Stages that differ in numbers only (generations) get no second line within this time [s].
+_COUNTED = 5.0
 _BAR = '{desc:40.40} {percentage:3.0f} % |{bar}| {elapsed}'
 _COUNT = '{desc:40.40} {n_fmt} [{elapsed}]'
 # Widgets have room for the whole name of a stage.
@@ -95,12 +98,20 @@ class Lines:
         """Start the clock."""
         self._write, self._brief = write, brief
         self._began = time.monotonic()
-        self._last = ''
+        self._last, self._written = '', self._began
 
     def __call__(self, stage: str, share: float | None) -> None:
-        """Write a line if the stage is another one than before."""
-        elapsed = time.monotonic() - self._began
+        """Write a line if the stage is another one than before, and no mere count of it."""
+        now = time.monotonic()
+        elapsed = now - self._began
         if stage == self._last or elapsed < self._brief:
             return
-        self._last = stage
+        if _wordy(stage) == _wordy(self._last) and now - self._written < _COUNTED:
+            return
+        self._last, self._written = stage, now
         self._write(f'{elapsed:7.1f} s {"" if share is None else f"{share:.0%}":>5}  {stage}')
+
+
+def _wordy(stage: str) -> str:
+    # A stage without its numbers.
+    return re.sub(r'[\d.]+', '', stage)
