@@ -41,16 +41,18 @@ def list_effects(name: str | None = None, model: PathLike | Husky | None = None)
             for kind in catalogue().values()))
     from lg_husky_sim.husky.effects import effect_kind
     kind, robot = effect_kind(name), as_husky(model).model.in_proportion().structure.robot
+    advice = kind.advice
+    notes = {
+        'Drives that bring it out': kind.manoeuvres,
+        'Sensors that see it directly': kind.sensors,
+        'On the robot, where it is found': tuple(map(_open, advice.robot)),
+        'In the simulator': tuple(map(_open, advice.simulator)),
+        'Parameters of sim_node that do nearly the same': tuple(map(_open, advice.instead))}
     return Table(f'{kind.id}: {kind.title}',
                  ('parameter', 'unit', 'typical', 'lower', 'upper', 'estimated', 'source'),
                  tuple((p.name, p.unit, p.starts[0], p.lower, p.upper,
                         not p.fixed, p.source)
-                       for p in (one.of(robot) for one in kind.parameters)), {
-        'Drives that bring it out': kind.manoeuvres,
-        'Sensors that see it directly': kind.sensors,
-        'On the robot, where it is found': tuple(map(_open, kind.advice.robot)),
-        'In the simulator': tuple(map(_open, kind.advice.simulator)),
-        'Parameters of sim_node that do nearly the same': tuple(map(_open, kind.advice.instead))})
+                       for p in (one.of(robot) for one in kind.parameters)), notes)
 
 
 def _open(sentence: str) -> str:

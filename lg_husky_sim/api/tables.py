@@ -49,7 +49,7 @@ class Table:
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[object, ...], ...]
-    notes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    notes: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
 
     def flush(self) -> list[bool]:
         """Return which columns hold numbers only and are set flush right."""
