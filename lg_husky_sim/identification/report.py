@@ -14,6 +14,7 @@ from pathlib import Path
 
 from lg_husky_sim.comparison.outcome import RANKED
 from lg_husky_sim.comparison.replay import replay
+from lg_husky_sim.comparison.scatter import scatter_notes
 from lg_husky_sim.comparison.traces import error_table, Predicted, traces_of
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.folders import check_ours, scratch_beside
@@ -194,8 +195,16 @@ def report_data(result: FitResult, segments: Sequence[Segment], before: ModelFil
         parameters=tuple(_parameter(one, result.model) for one in result.estimates),
         parameters_first=True,
         notes=(f'Errors are {SIGN}; x is ahead and y to the left of the robot as it stood at the '
-               'start of the recording.', *result.undetermined),
+               'start of the recording.', *result.undetermined, *_scatter(replayed, segments)),
         provenance=provenance or Provenance())
+
+
+def _scatter(table: ErrorTable, segments: Sequence[Segment]) -> tuple[str, ...]:
+    # What of the forward speed's error no model is to blame for.
+    name = quantity_with_unit('forward')
+    known = [value for row in table.rows if row.name == name for value in row.values.values()
+             if math.isfinite(value)]
+    return scatter_notes(segments, min(known)) if known else ()
 
 
 def _headline(result: FitResult, table: ErrorTable) -> Headline:

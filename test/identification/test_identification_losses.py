@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import json
 from pathlib import Path
 
 import lg_husky_sim as lg
 from lg_husky_sim.cli.main import run
+from lg_husky_sim.signals import TimeSeries
+import numpy as np
 import pytest
 
 WORSE = 'Driven by the commands alone, the fitted model predicts worse than the one before: '
@@ -50,3 +53,17 @@ def test_a_model_that_fits_better_has_no_loss() -> None:
 def test_rounding_is_no_loss() -> None:
     fit = lg.Husky().identify(lg.Husky().simulate('s_bend'), progress=False)
     assert fit.result.losses == ()
+
+
+def test_the_page_says_what_of_an_error_is_scatter_of_the_pose(tmp_path: Path) -> None:
+    drive = lg.Husky(wheel_damping=1.6).simulate('s_bend')
+    pose = drive.pose
+    noise = np.random.default_rng(2).normal(0.0, 0.05, pose.values.shape) * (1.0, 1.0, 0.0)
+    noisy = replace(drive, streams={**drive.streams, 'pose': TimeSeries(
+        pose.times, pose.values + noise, pose.names)})
+    said = []
+    for one in (drive, noisy):
+        fit = lg.Husky().identify(one, ['wheel_damping'], starts=1, progress=False)
+        page = fit.report(tmp_path).read_text(encoding='utf-8')
+        said.append('has a scatter of at least' in page)
+    assert said == [False, True]
