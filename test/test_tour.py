@@ -51,6 +51,8 @@ def test_tour_shows_every_offline_step(toured: tuple[Path, str]) -> None:
                  'found/diagnosis.json', 'found/model.yaml', 'after/index.html'):
         assert (folder / name).stat().st_size > 0, name
     assert 'Poles with the numbers of the model' in said
+    # The sealed answer is one line, not a hundred of JSON.
+    assert said.splitlines()[-1] == ' "name": "command_slew/medium",'
 
 
 def test_tour_finds_what_was_hidden_and_the_fit_improves(toured: tuple[Path, str]) -> None:
