@@ -50,6 +50,7 @@ from lg_husky_sim.simulation.arrays import (
     U,
     U_INSIDE,
     Work,
+    XI,
 )
 from lg_husky_sim.simulation.modal_kernel import advance, doubled, phis
 
@@ -179,7 +180,12 @@ def efforts_at(plant: Packed, c: int, s: FloatArray, n: int, time: float, at: fl
     few[U_INSIDE, 1] = few[U, 1] + at * few[DU, 1]
     few[CONTEXT, 0] = time + at
     for first in range(1 + max(plant.counts[c, POSED], plant.counts[c, ADDING])):
-        advance(at, first, modes, PHI + 4 * node, n_real, n_pairs)
+        if at > 0.0:
+            advance(at, first, modes, PHI + 4 * node, n_real, n_pairs)
+        else:
+            # Nothing has set the phis, the rate and the forcing yet.
+            for i in range(modes.shape[1]):
+                modes[INSIDE, i] = modes[XI, i] if first == 0 else 0.0
         if first == 0:
             _read_arguments(plant, c, work, row)
         elif plant.counts[c, POSED]:
@@ -214,9 +220,11 @@ def bend(plant: Packed, c: int, h: float, work: Work) -> None:
         modes[BEND, i] = 0.0
     scale = 1.0 / h if h > 0.0 else 0.0
     for e in range(plant.counts[c, EFFORTS]):
-        linear = (4.0 * efforts[F + 1, e] - 3.0 * efforts[F, e] - efforts[F + 2, e]) * scale
-        square = 2.0 * (efforts[F, e] - 2.0 * efforts[F + 1, e] + efforts[F + 2, e]) * (
-            scale * scale)
+        linear, square = 0.0, 0.0
+        if h > 0.0:
+            linear = (4.0 * efforts[F + 1, e] - 3.0 * efforts[F, e] - efforts[F + 2, e]) * scale
+            square = 2.0 * (efforts[F, e] - 2.0 * efforts[F + 1, e] + efforts[F + 2, e]) * (
+                scale * scale)
         efforts[PARABOLA, e], efforts[PARABOLA + 1, e] = linear, square
         for i in range(modes.shape[1]):
             modes[SLOPE, i] += modal[c, GAINS + e, i] * linear

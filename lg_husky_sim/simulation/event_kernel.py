@@ -31,6 +31,7 @@ from lg_husky_sim.simulation.arrays import (
     AIMS,
     BEYOND_PLACE,
     COMMANDED,
+    CONTEXT,
     DRIVEN,
     DU,
     EFFORTS,
@@ -167,6 +168,8 @@ def _enter(s: FloatArray, n: int, few: FloatArray) -> None:
     for i in range(MEMORIES):
         few[MEMORY, i] = s[n + 7 + i]
     few[TANGENT, 0], few[TANGENT, 1] = math.cos(s[n + 3]), math.sin(s[n + 3])
+    # The laws' sub-step: there is none between events.
+    few[CONTEXT, 6] = 0.0
 
 
 @jit_part
