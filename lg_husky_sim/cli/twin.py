@@ -7,11 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 from pathlib import Path
-import time
 from typing import TYPE_CHECKING
 
 import click
-from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, RosVerb
+from lg_husky_sim.cli.ros_arguments import robot_options, ROS_HELP, ros_tool, RosVerb, say
 
 if TYPE_CHECKING:
     from lg_husky_sim.ros.twin import Twin
@@ -46,27 +45,30 @@ def command(model: Path, plain: Path | None, preset: str | None, namespace: str 
     (layout config/twin.foxglove.json), twin/measured and twin/model/reading are published at each
     stamp. The models start at the robot's wheel angles and pose, apply the delays, sensor
     faults and onsets that were found, and follow the clock of its stamps. The robot may as well be
-    `lg_husky play REC` or another simulator.
+    `lg_husky play REC` or another simulator. With -p use_sim_time:=true the times of the options
+    are those of /clock.
     """
     from lg_husky_sim.husky.model import compile_model
     from lg_husky_sim.husky.model_file import load_model, nominal_of
     from lg_husky_sim.ros.tool import Ended
-    from lg_husky_sim.ros.twin import NAME, SILENCE, Twin
+    from lg_husky_sim.ros.twin import NAME, Twin
 
     own = load_model(model)
     files = {'plain': nominal_of(own) if plain is None else load_model(plain), 'model': own}
     plants = {name: compile_model(one.structure).at(one.parameters)
               for name, one in files.items()}
     with ros_tool(NAME, preset, namespace, wait=wait) as (tool, settings):
+        if tool.simulated:
+            say('waiting for /clock')
+            tool.wait_for_time(wait)
         twin = Twin(tool, plants, settings, _sides, pose_topic)
-        begun = time.monotonic()
+
+        def show(passed: float, silent: bool) -> None:
+            now = (f'nothing received for {twin.silence:.1f} s' if silent
+                   else _errors(twin, 'now'))
+            click.echo(f'{passed:7.1f} s  {now}')
         try:
-            while seconds is None or time.monotonic() - begun < seconds:
-                twin.spin(every)
-                silent = twin.silence > max(SILENCE, every)
-                now = (f'nothing received for {twin.silence:.1f} s' if silent
-                       else _errors(twin, 'now'))
-                click.echo(f'{time.monotonic() - begun:7.1f} s  {now}')
+            twin.run(seconds, every, show)
         except Ended:
             click.echo('')
         finally:

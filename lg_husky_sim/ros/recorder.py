@@ -15,7 +15,7 @@ from lg_husky_sim.ros import api
 from lg_husky_sim.ros.bag_writer import bag_writer
 from lg_husky_sim.ros.graph import publishers
 from lg_husky_sim.ros.settings import Settings
-from lg_husky_sim.ros.tool import Ended, LOOK, Say, Tool
+from lg_husky_sim.ros.tool import Elapsed, Ended, LOOK, Say, Tool
 
 NAME = 'lg_husky_recorder'
 #: Samples kept while the disk is busy.
@@ -212,12 +212,12 @@ def record(tool: Tool, path: Path, settings: Settings, *, storage: str = 'mcap',
             _await_first(tool, recorder)
             say('recording ' + ('until Ctrl-C' if seconds is None else f'for {seconds:g} s')
                 + ('' if any(recorder.counts.values()) else '; nothing has been received yet'))
-            begun, due = tool.now(), time.monotonic() + EVERY
-            while seconds is None or tool.now() < begun + seconds:
+            passed, due = Elapsed(tool.now), time.monotonic() + EVERY
+            while seconds is None or passed() < seconds:
                 tool.serve()
                 if time.monotonic() >= due:
                     due += EVERY
-                    say(running(recorder.counts, tool.now() - begun))
+                    say(running(recorder.counts, passed()))
         except Ended:
             say('stopped')
         empty = not any(recorder.counts.values())

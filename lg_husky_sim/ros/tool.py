@@ -170,11 +170,25 @@ class Tool:
         self._executor.spin_once(timeout_sec=WAIT)
 
     def serve_until(self, moment: float) -> None:
-        """Serve callbacks until :meth:`now` has come to a moment [s]."""
+        """
+        Serve callbacks until :meth:`now` has come to a moment [s].
+
+        Raises
+        ------
+        CommandError
+            If /clock goes back meanwhile: what is paced by it would be silent until it is there
+            again.
+
+        """
+        last = self.now()
         while True:
-            left = moment - self.now()
+            now = self.now()
+            left = moment - now
             if left <= 0.0:
                 return
+            if now < last:
+                raise CommandError(f'/clock went back by {last - now:.3f} s')
+            last = now
             if not self.simulated and left < 2.0 * WAIT:
                 self.orderly.check()
                 time.sleep(left)
@@ -193,6 +207,30 @@ class Tool:
         """Leave the graph."""
         self._executor.shutdown()
         self.node.destroy_node()
+
+
+class Elapsed:
+    """
+    The time that has passed on a clock [s], counted whenever it is called.
+
+    A clock that is set back, as /clock with a simulation that begins anew, goes on from there.
+
+    Parameters
+    ----------
+    now : callable
+        The clock [s], such as :meth:`Tool.now`.
+
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        """Begin now."""
+        self._now, self._last, self._passed = now, now(), 0.0
+
+    def __call__(self) -> float:
+        """Return the time since the beginning [s]."""
+        last, self._last = self._last, self._now()
+        self._passed += max(0.0, self._last - last)
+        return self._passed
 
 
 def _said(arguments: Sequence[str], name: str) -> str | None:

@@ -15,7 +15,7 @@ from lg_husky_sim.ros.conversions import pose_from_msg, stamp_nanoseconds, twist
 from lg_husky_sim.ros.settings import Settings
 from lg_husky_sim.ros.shadow import QUANTITIES, RunningError, Shadow, SILENCE
 from lg_husky_sim.ros.stamp_clock import StampClock
-from lg_husky_sim.ros.tool import Tool
+from lg_husky_sim.ros.tool import Elapsed, Tool
 from lg_husky_sim.signals import BodyTwist
 
 NAME = 'lg_husky_twin'
@@ -158,11 +158,19 @@ class Twin:
         return time.monotonic() - self._arrived
 
     def spin(self, seconds: float) -> None:
-        """Serve callbacks for some time [s], then publish the running errors if there are new."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
+        """
+        Serve callbacks for some time [s], then publish the running errors if there are new.
+
+        With ``use_sim_time`` it is that of /clock, unless the robot is silent for as long: a
+        robot that was killed may have been the one that published it.
+        """
+        passed, begun, quiet = Elapsed(self._tool.now), time.monotonic(), max(SILENCE, seconds)
+        while passed() < seconds:
             self._tool.serve()
-        if self.silence > max(SILENCE, seconds):
+            if self._tool.simulated and time.monotonic() - begun > quiet and not (
+                    self.silence < quiet):
+                break
+        if self.silence > quiet:
             return
         for (name, quantity), publisher in self._publishers.items():
             value = self.shadows[name].errors[quantity].now
@@ -170,3 +178,28 @@ class Twin:
                 message = self._float()
                 message.data = value
                 publisher.publish(message)
+
+    def run(self, seconds: float | None, every: float, show: Callable[[float, bool], object]
+            ) -> None:
+        """
+        Go on until the time is over.
+
+        Parameters
+        ----------
+        seconds : float, optional
+            How long [s], by the ROS clock; until the tool is asked to end if not given.
+        every : float
+            Time between two publications [s], likewise.
+        show : callable
+            Is told at each of them how long it has run [s], and whether the robot is silent.
+
+        Raises
+        ------
+        Ended
+            If the tool was asked to end.
+
+        """
+        passed = Elapsed(self._tool.now)
+        while seconds is None or passed() < seconds:
+            self.spin(every if seconds is None else min(every, seconds - passed()))
+            show(passed(), self.silence > max(SILENCE, every))

@@ -364,37 +364,3 @@ def test_a_recording_of_nothing_is_an_error(probe: Probe, tmp_path: Path) -> Non
     finally:
         tool.close()
     assert list(tmp_path.iterdir()) == []
-
-
-def test_simulated_time_paces_a_drive_and_is_waited_for(probe: Probe) -> None:
-    """A drive that begins at time zero sends all at once what lies before the first /clock."""
-    heard = probe.listen('geometry_msgs/msg/Twist', COMMAND)
-    clock, kind = probe.talk('rosgraph_msgs/msg/Clock', '/clock')
-    driver = run('drive', 'circle', '--preset', 'paper', '--namespace', '/', '--wait', '30',
-                 '--ros-args', '-p', 'use_sim_time:=true')
-    message = kind()
-
-    def say(second: int, nanosecond: int = 0) -> None:
-        message.clock.sec, message.clock.nanosec = second, nanosecond
-        clock.publish(message)
-        probe.spin(0.05)
-    try:
-        assert probe.until(lambda: clock.get_subscription_count() > 0, 30.0)
-        for _ in range(100):
-            say(50)
-            if heard:
-                break
-        assert len(heard) == 1
-        for _ in range(5):
-            say(50)
-        assert len(heard) == 1
-        for tenth in range(1, 10):
-            say(50, tenth * 10**8)
-        assert len(heard) == pytest.approx(19, abs=1)
-        driver.send_signal(signal.SIGINT)
-        driver.communicate(timeout=10.0)
-    finally:
-        driver.kill()
-        driver.wait()
-    assert driver.returncode == 130
-    assert probe.until(lambda: speeds(heard)[-ZEROS:] == [(0.0, 0.0)] * ZEROS)
