@@ -44,7 +44,7 @@ WHEELS = ('numpy', 'numba', 'rosbags', 'cyclonedds', 'pytest')
 PLUGINS = ('-p', 'no:cacheprovider', '-p', 'no:launch_testing', '-p', 'no:launch_ros',
            '-p', 'no:launch_testing_ros_pytest_entrypoint')
 PYTEST = ('-m', 'pytest', 'test/ros', '--ignore', 'test/ros/stacks', '-q', *PLUGINS)
-STACKS = ('-m', 'pytest', 'test/ros/stacks', '-s', '-q', '-rs', *PLUGINS)
+STACKS = ('-m', 'pytest', 'test/ros/stacks', '-s', '-q', '-rsfE', *PLUGINS)
 #: How a test begins a line that is to be copied.
 FIGURE = 'figure: '
 #: What is typed beside a node with services in a map; the last ones change it.

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import time
 
-from lg_husky_sim.ros.pacing import Pace, Stamps
+from lg_husky_sim.ros.pacing import LAST_STAMP, Pace, Stamps
 from lg_husky_sim.ros.settings import Settings
 
 _SECOND = 1_000_000_000
@@ -133,5 +133,5 @@ class Clockwork:
             # More steps than time: each gets its moment, and no two the same.
             self._stamps = Stamps(max(self._ros_now(), self._last + 1), total,
                                   self._stamps.spacing)
-        self._last = max(self._last, self._stamps.of(total))
+        self._last = min(max(self._last, self._stamps.of(total)), LAST_STAMP)
         return self._last

@@ -7,6 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 _SECOND = 1_000_000_000
+#: Slowest speed but 0: at less, a few steps are years on the clock of the stamps.
+SLOWEST = 0.001
+#: Last stamp that a message holds [ns]: builtin_interfaces/Time has 31 bits for its seconds.
+LAST_STAMP = (2 ** 31 - 1) * _SECOND
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import Any
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.resources import config_path
+from lg_husky_sim.ros.pacing import SLOWEST
 from lg_husky_sim.ros.wheel_odometry import assumed_for
 from lg_husky_sim.yaml_files import read_yaml, shown
 
@@ -295,6 +296,8 @@ class Settings:
         for field in fields(self):
             value = BY_NAME[field.name].checked(getattr(self, field.name))
             object.__setattr__(self, field.name, value)
+        if 0.0 < self.speed < SLOWEST:
+            raise SettingsError(f'speed = {self.speed:g} is not allowed: 0, or from {SLOWEST:g}')
         for name in ('joint_states_rate', 'imu_rate', *(
                 ['scan_rate'] if self.scan != 'none' else [])):
             self.every(name)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.ros import clockwork
 from lg_husky_sim.ros.clockwork import Clockwork
 from lg_husky_sim.ros.settings import make_settings
@@ -81,3 +82,14 @@ def test_time_of_another_clock_has_not_gone_back(times: Times, known: bool) -> N
     one.look(50)
     assert said == [f'/clock went back by {41 if known else 42}.000 s; steps and stamps restart '
                     'there']
+
+
+def test_stamps_end_where_messages_cannot_hold_them(times: Times) -> None:
+    """A slow node that was asked for many steps while paused ended: its stamps had no room."""
+    one, _ = started(times)
+    one.resume(make_settings(rate=1.0, speed=0.001), 0)
+    assert one.stamp(1) == times.ros + 1000 * SECOND
+    assert one.stamp(10**6) == (2**31 - 1) * SECOND
+    for speed in (5e-324, 1e-10, 0.0009):
+        with pytest.raises(SettingsError, match=r'is not allowed: 0, or from 0\.001$'):
+            make_settings(speed=speed)

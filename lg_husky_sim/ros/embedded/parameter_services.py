@@ -37,13 +37,11 @@ def offer_parameter_services(node: Node, store: ParameterStore) -> None:
         return response
 
     def set_each(request: Any, response: Any) -> Any:
-        response.results = [store.set_atomically([Parameter.from_parameter_msg(one)])
-                            for one in request.parameters]
+        response.results = [store.set_messages([one]) for one in request.parameters]
         return response
 
     def set_all(request: Any, response: Any) -> Any:
-        response.result = store.set_atomically(
-            [Parameter.from_parameter_msg(one) for one in request.parameters])
+        response.result = store.set_messages(request.parameters)
         return response
 
     def listing(request: Any, response: Any) -> Any:

@@ -83,7 +83,18 @@ class Parameter:
 
     @classmethod
     def from_parameter_msg(cls, msg: Any) -> Parameter:
-        """Read a rcl_interfaces/msg/Parameter."""
+        """
+        Read a rcl_interfaces/msg/Parameter.
+
+        Raises
+        ------
+        ParameterException
+            If its type is none that there is.
+
+        """
+        if msg.value.type not in list(ParameterType):
+            raise ParameterException(f'parameter {msg.name!r} has a type {msg.value.type} that '
+                                     'is unknown')
         kind = ParameterType(msg.value.type)
         value: Any = getattr(msg.value, _FIELDS[kind]) if kind else None
         if kind in (ParameterType.BOOL_ARRAY, ParameterType.INTEGER_ARRAY,
@@ -194,6 +205,14 @@ class ParameterStore:
             return (f'Parameter {parameter.name} = {parameter.value!r} is '
                     f'{parameter.type_.name}, not {ParameterType(descriptor.type).name}')
         return _range_error(parameter.name, parameter.value, descriptor)
+
+    def set_messages(self, messages: Sequence[Any]) -> Any:
+        """Set all or none of some rcl_interfaces/msg/Parameter, as :meth:`set_atomically`."""
+        try:
+            return self.set_atomically([Parameter.from_parameter_msg(one) for one in messages])
+        except ParameterException as error:
+            result = message_class('rcl_interfaces/msg/SetParametersResult')
+            return result(successful=False, reason=str(error))
 
     def set_atomically(self, parameters: list[Parameter]) -> Any:
         """Set all or none; return a rcl_interfaces/msg/SetParametersResult."""

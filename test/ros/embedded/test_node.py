@@ -23,7 +23,12 @@ from lg_husky_sim.ros.embedded.context import (
 )
 from lg_husky_sim.ros.embedded.messages import deserialise, message_class, serialise
 from lg_husky_sim.ros.embedded.node import Node
-from lg_husky_sim.ros.embedded.parameters import Parameter, parameter_type, ParameterException
+from lg_husky_sim.ros.embedded.parameters import (
+    Parameter,
+    parameter_type,
+    ParameterException,
+    ParameterStore,
+)
 from lg_husky_sim.ros.embedded.qos import DurabilityPolicy, QoSProfile
 from lg_husky_sim.ros.embedded.spin import SingleThreadedExecutor, spin, spin_once
 from lg_husky_sim.testing.live import isolated_domain
@@ -253,3 +258,18 @@ def test_time_arithmetic() -> None:
     assert (moment - Time(nanoseconds=5)).nanoseconds == 10**9
     assert Time.from_msg(moment.to_msg()) == moment
     assert Duration(nanoseconds=-1).to_msg().nanosec == 999_999_999
+
+
+def test_a_parameter_of_an_unknown_type_is_refused() -> None:
+    """Anybody's request of such a one ended the node."""
+    store = ParameterStore({})
+    store.declare('speed', 1.0, None, False)
+    kind = message_class('rcl_interfaces/msg/Parameter')
+    sound, odd = (Parameter.of('speed', 2.0).to_parameter_msg() for _ in range(2))
+    odd.value.type = 255
+    assert isinstance(sound, kind)
+    result = store.set_messages([sound, odd])
+    assert not result.successful
+    assert result.reason == "parameter 'speed' has a type 255 that is unknown"
+    assert store.get('speed').value == 1.0
+    assert store.set_messages([sound]).successful
