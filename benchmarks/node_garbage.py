@@ -5,6 +5,7 @@ Another participant's garbage on every topic and service of a live node; exits 1
 
     python benchmarks/node_garbage.py [--count 300] [--seed 1]
     ROS_DOMAIN_ID=42 python benchmarks/node_garbage.py --attach    # to a node that runs there
+    … --attach --topics                                            # no services
 
 Three kinds go to each endpoint: fields filled at random with the ends of their ranges, NaN, wrong
 texts and names of parameters; bytes of such messages, damaged; and bytes by a writer that lies
@@ -49,7 +50,7 @@ FLOATS = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, -0.0, 0.0, 1.0, 
 LONGEST = 2000
 
 
-def endpoints(simulated: bool) -> Iterator[tuple[str, str, bool]]:
+def endpoints(simulated: bool, services: bool) -> Iterator[tuple[str, str, bool]]:
     """Yield name and type of what the node listens to, and whether it is a service."""
     one = make_settings()
     if simulated:
@@ -60,6 +61,8 @@ def endpoints(simulated: bool) -> Iterator[tuple[str, str, bool]]:
     yield f'/{one.map_topic}', 'nav_msgs/msg/OccupancyGrid', False
     for name, kind, _ in TOPICS:
         yield f'{NODE}/{name}', kind, False
+    if not services:
+        return
     for name, kind, _ in SERVICES:
         yield f'{NODE}/{name}', kind, True
     for kind in PARAMETERS:
@@ -207,7 +210,7 @@ def recovered(probe: Probe, truth: list[Any], simulated: bool) -> tuple[int, boo
         message.twist.twist.linear.x, message.twist.twist.angular.z))
 
 
-def trial(count: int, seed: int, *, simulated: bool, attach: bool) -> bool:
+def trial(count: int, seed: int, *, simulated: bool, attach: bool, services: bool = True) -> bool:
     """Send garbage to one node and say what is left of it."""
     node = None if attach else NodeProcess(
         {'scan': 'map', 'use_sim_time': simulated}, environment={
@@ -217,7 +220,7 @@ def trial(count: int, seed: int, *, simulated: bool, attach: bool) -> bool:
     try:
         truth = probe.listen('nav_msgs/msg/Odometry', '/ground_truth', 1000)
         senders = [Sender(name, kind, service, tally)
-                   for name, kind, service in endpoints(simulated)]
+                   for name, kind, service in endpoints(simulated, services)]
         deaf = [sender.kind for sender in senders if not probe.until(
             sender.writer.get_matched_subscriptions, 30.0)]
         before = resident(node.process.pid) if node else math.nan
@@ -257,12 +260,14 @@ def main() -> int:
     parser.add_argument('--count', type=int, default=300, help='messages of a kind an endpoint')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--attach', action='store_true', help='to the node of ROS_DOMAIN_ID')
+    parser.add_argument('--topics', action='store_true', help='no services')
     given = parser.parse_args()
     if api.HAVE_RCLPY:
         parser.error('an interpreter without ROS is needed; the node may be any: --attach')
     if given.attach:
         os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        return int(not trial(given.count, given.seed, simulated=False, attach=True))
+        return int(not trial(given.count, given.seed, simulated=False, attach=True,
+                             services=not given.topics))
     with isolated_domain():
         broken = sum(not trial(given.count, given.seed, simulated=simulated, attach=False)
                      for simulated in (False, True))

@@ -205,6 +205,41 @@ def own_arguments(words: Sequence[str]) -> list[str]:
     return own
 
 
+def _of_parameter_services(error: BaseException) -> bool:
+    # Whether rclpy's own services of parameters raised it.
+    frame = error.__traceback__
+    while frame is not None:
+        if frame.tb_frame.f_globals.get('__name__') == 'rclpy.parameter_service':
+            return True
+        frame = frame.tb_next
+    return False
+
+
+def keep_spinning(node: Node) -> None:
+    """
+    Spin until the graph is left, whatever others ask of the node's parameters.
+
+    A request with a type of parameter that is unknown ends every node of rclpy: its services of
+    parameters raise, and nobody catches that.
+
+    Parameters
+    ----------
+    node : Node
+        To be spun.
+
+    """
+    while True:
+        try:
+            spin(node)
+        except Exception as error:
+            if not _of_parameter_services(error):
+                raise
+            node.get_logger().warning(f'request of a parameter refused: {error}',
+                                      throttle_duration_sec=1.0)
+        else:
+            return
+
+
 def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Any:
     """
     Return a timer on the steady clock, whatever time the node goes by.
@@ -279,6 +314,7 @@ __all__ = [
     'future',
     'init',
     'join',
+    'keep_spinning',
     'leave',
     'message_type',
     'ok',

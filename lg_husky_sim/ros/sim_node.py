@@ -88,7 +88,7 @@ def _run(args: Sequence[str] | None) -> int:
         # which would make steps late.
         gc.freeze()
         if not asked:
-            api.spin(node)
+            api.keep_spinning(node)
     except (KeyboardInterrupt, api.ExternalShutdownException):
         code = 0
     except Exception as error:
