@@ -66,7 +66,10 @@ class Clockwork:
         self._heard = now > 0
         self._pace = Pace(now if self._following else time.monotonic_ns(), total, settings.rate,
                           speed)
-        if not self._following:
+        if self._following:
+            # A clock that goes back before the next step goes back, too.
+            self._last = now
+        else:
             # Steps made while paused may have gone ahead of the clock.
             now = max(now, self._last)
         self._stamps = Stamps(now, total, _SECOND / (settings.rate * speed))

@@ -93,3 +93,15 @@ def test_stamps_end_where_messages_cannot_hold_them(times: Times) -> None:
     for speed in (5e-324, 1e-10, 0.0009):
         with pytest.raises(SettingsError, match=r'is not allowed: 0, or from 0\.001$'):
             make_settings(speed=speed)
+
+
+def test_a_clock_that_goes_back_before_a_step_is_followed(times: Times) -> None:
+    """The node stood still until /clock had come that far again."""
+    times.follows, times.ros = True, 2 * 10**9 * SECOND
+    one, said = started(times)
+    times.ros = 5 * SECOND
+    one.look(0)
+    assert said == ['/clock went back by 1999999995.000 s; steps and stamps restart there']
+    times.ros += SECOND
+    one.look(0)
+    assert one.due(0) == 50
