@@ -4,19 +4,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cache
 import math
 
 from lg_husky_sim.comparison.slopes import body_rates, WINDOW
 from lg_husky_sim.recording import Segment
 from lg_husky_sim.reporting.words import number
+from lg_husky_sim.settings import numbers
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Share of the error of the forward speed from which the scatter of the pose is worth a note.
-SHARE = 0.3
-#: A model that misses a speed by less than this share of its scatter follows bends, not noise.
-FOLLOWED = 0.5
+
+@cache
+def settings() -> Mapping[str, float]:
+    """Return the numbers of ``config/comparison.yaml`` by name."""
+    return numbers('comparison.yaml', 'lg_husky_sim/comparison/1')
 
 
 def scatter_of(times: FloatArray, forward: FloatArray) -> float:
@@ -61,7 +64,8 @@ def counts(scatter: float, least: float) -> bool:
         False also where a model misses the speed by much less: commands do not foretell noise.
 
     """
-    return SHARE * least < scatter <= least / FOLLOWED
+    known = settings()
+    return known['scatter_share'] * least < scatter <= least / known['scatter_followed']
 
 
 def scatter_note(scatter: float) -> str:

@@ -344,7 +344,8 @@ def test_the_scatter_of_a_pose_is_said_where_it_is_a_part_of_the_errors(
     values = 0.003 * np.random.default_rng(1).standard_normal(pose.values.shape)
     still = changed(clean, imu=None, pose=TimeSeries(pose.times, values, pose.names))
     for share, said in ((0.3, False), (0.01, True)):
-        monkeypatch.setattr(scatter, 'SHARE', share)
+        monkeypatch.setattr(scatter, 'settings', lambda share=share: {
+            'scatter_share': share, 'scatter_followed': 0.5})
         notes = diagnose([still], load_model(), silent).diagnosis.notes
         assert any('has a scatter of at least' in note for note in notes) is said
 
