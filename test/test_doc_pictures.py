@@ -32,7 +32,7 @@ REPORTS = sorted((path.stem for path in DOCS.glob('proof_report_*.jsonl')), reve
 OUTCOMES = ('proof_report', 'proof_exam', 'proof_exam_2', 'proof_exam_3', 'proof_exam_4',
             'proof_exam_5', 'proof_exam_6', 'proof_exam_7', 'proof_exam_8', 'proof_exam_9',
             'proof_exam_10', 'proof_exam_11', 'proof_exam_12', 'proof_exam_13', 'proof_exam_14',
-            'proof_exam_15', 'proof_exam_16',
+            'proof_exam_15', 'proof_exam_16', 'proof_exam_17',
             *REPORTS,
             'proof_validation')
 
@@ -102,7 +102,7 @@ def test_the_picture_of_the_graph_is_that_of_todays_graph(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(('page', 'first', 'last'), [
     ('README.md', 'The finding: its', 'Clearpath'),
-    ('docs/real_recordings.md', 'that\n\n- the base', 'What remains'),
+    ('docs/real_recordings.md', 'that\n\n- the base', 'Little remains'),
 ])
 def test_text_and_picture_of_the_real_diagnosis_give_the_same_figures(
         page: str, first: str, last: str) -> None:
