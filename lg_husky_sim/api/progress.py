@@ -18,7 +18,8 @@ Report: TypeAlias = Callable[[str, float | None], None]
 Shown: TypeAlias = bool | Report
 """True: shown where someone watches; False: never; or a function that is told."""
 
-#: Stages that differ in numbers only (generations) get no second line within this time [s].
+#: Stages that differ in numbers only (generations), with the same share of what is done, get no
+#: second line within this time [s].
 _COUNTED = 5.0
 _BAR = '{desc:40.40} {percentage:3.0f} % |{bar}| {elapsed}'
 _COUNT = '{desc:40.40} {n_fmt} [{elapsed}]'
@@ -99,16 +100,18 @@ class Lines:
         self._write, self._brief = write, brief
         self._began = time.monotonic()
         self._last, self._written = '', self._began
+        self._share: float | None = None
 
     def __call__(self, stage: str, share: float | None) -> None:
-        """Write a line if the stage is another one than before, and no mere count of it."""
+        """Write a line if the stage is another one than before, and no mere count without gain."""
         now = time.monotonic()
         elapsed = now - self._began
         if stage == self._last or elapsed < self._brief:
             return
-        if _wordy(stage) == _wordy(self._last) and now - self._written < _COUNTED:
+        if (_wordy(stage), share) == (_wordy(self._last), self._share) and (
+                now - self._written < _COUNTED):
             return
-        self._last, self._written = stage, now
+        self._last, self._written, self._share = stage, now, share
         self._write(f'{elapsed:7.1f} s {"" if share is None else f"{share:.0%}":>5}  {stage}')
 
 
