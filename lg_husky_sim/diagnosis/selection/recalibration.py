@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
@@ -14,6 +15,7 @@ from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
 from lg_husky_sim.diagnosis.selection.conventions import best_reading, read_like
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
+from lg_husky_sim.diagnosis.selection.rotors import other_rotors
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted, Tried
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.selection.ticks import likelier_ticks, ticked
@@ -43,8 +45,18 @@ class Logged:
 
 
 def as_logged(evidence: Evidence, base: Fit, afresh: bool = False) -> Logged:
-    """Return a base with the likeliest reading, unless an effect promises more than that."""
+    """
+    Return a base with the likeliest reading or rotors, unless an effect promises more than that.
+
+    A slow sensor and a slow robot are alike; of as many numbers as each has estimated, half the
+    logarithm of the number of readings is the price of one.
+    """
     chosen = best_reading(evidence, base, afresh)
+    heavier = other_rotors(evidence, base)
+    if heavier is not None:
+        more = 1 + len(base.point.unknowns) - len(chosen.point.unknowns)
+        if heavier.cost + 0.5 * more * math.log(evidence.count) < chosen.cost:
+            chosen = heavier
     if chosen is base:
         return Logged(base)
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]

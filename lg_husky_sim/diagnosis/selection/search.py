@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+import math
 
 from lg_husky_sim.diagnosis.evidence.base_clock import ticking
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
@@ -33,6 +34,7 @@ from lg_husky_sim.diagnosis.selection.recalibration import (
     promising,
     recalibrated,
 )
+from lg_husky_sim.diagnosis.selection.rotors import other_rotors, with_any_rotors
 from lg_husky_sim.diagnosis.selection.rounds import (
     calibrated,
     forward_step,
@@ -295,6 +297,18 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         best = one.tried[0] if one.tried else None
         evidence = one.evidence
         adopted = best is not None and one.adopted
+        other_base = other_rotors(evidence, one.base)
+        if other_base is not None and (
+                not adopted or best is None or best.score <= one.base.cost - other_base.cost
+                - 0.5 * math.log(evidence.count)):
+            # No effect, but a robot that the nominal numbers leave something out of: look again.
+            initial, otherwise, postponed = with_any_rotors(initial), None, False
+            evidence, base = calibrated(evidence, other_base.point, 1)
+            evidence, base = _read_as(evidence, base, best_reading(evidence, base, afresh=True))
+            known = replace(known, evidence=evidence, base=base)
+            start = nominal_of(base.point)
+            plain = evidence.fit(with_effects(plain.point, base.point, []))
+            continue
         if postponed and not found:
             chosen = best_reading(evidence, one.base)
             if not adopted or best is None or one.base.cost - chosen.cost >= best.gain:

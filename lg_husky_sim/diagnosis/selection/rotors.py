@@ -1,0 +1,56 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether the wheels turn with more than their nominal inertia.
+
+Data sheets and robot descriptions give the inertia of wheels. What a motor has to turn has that of
+its rotor J as well, times the square of the gear ratio N: J_w + N^2 J. With N = 78.71, a rotor of
+1e-5 kg m^2 is 0.06 kg m^2. As long as nothing says so, the nominal number is taken for right
+within its tolerance; where effects are compared, a robot of other rotors is a rival of each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.point import Point
+from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
+from lg_husky_sim.diagnosis.settings import setting
+
+
+def with_any_rotors(point: Point) -> Point:
+    """Return a point whose wheel inertia is known no better than that of robots of any rotors."""
+    spread = setting('rotor_spread')
+    return replace(point, unknowns=tuple(
+        replace(u, deviation=max(u.deviation, spread)) if u.name == 'wheel_inertia' else u
+        for u in point.unknowns))
+
+
+def other_rotors(evidence: Evidence, base: Fit) -> Fit | None:
+    """
+    Return a model with another wheel inertia where that is likelier than chance has it.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Drives, and the noise under which fits are made.
+    base : Fit
+        With the nominal inertia within its tolerance.
+
+    Returns
+    -------
+    Fit or None
+        None where the base has any inertia already, or nothing says that it is another one.
+
+    """
+    point = with_any_rotors(base.point)
+    wider = sum(math.log(new.deviation / old.deviation) for new, old in zip(
+        point.unknowns, base.point.unknowns, strict=True) if new is not old)
+    if not wider:
+        return None
+    starts = [point, nominal_of(point)] if is_distorted(base) else [point]
+    best = min(map(evidence.fit, starts), key=lambda fit: fit.cost)
+    by_chance = wider - math.log(setting('false_alarm_rate'))
+    return best if base.cost - best.cost > by_chance else None
