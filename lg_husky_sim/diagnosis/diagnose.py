@@ -32,6 +32,7 @@ from lg_husky_sim.diagnosis.log_notes import log_notes, reading_notes
 from lg_husky_sim.diagnosis.model_mismatch import model_mismatch, ModelMismatch, unsearched
 from lg_husky_sim.diagnosis.nameless import described, left_over, remaining, unknown_finding
 from lg_husky_sim.diagnosis.result import Diagnosis, grown, Rivalry, Verdict
+from lg_husky_sim.diagnosis.selection.rotors import rotor_notes
 from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.search import Progress, Search, search
 from lg_husky_sim.diagnosis.selection.supply import likeliest_supply
@@ -267,7 +268,7 @@ def _notes(found: Search, plain: dict[str, float], augmented: dict[str, float]
                      'of what this log makes of them (below), which numbers of the '
                      'recalibrated model may stand for')
     notes += log_notes(found.evidence.drives)
-    notes += made
+    notes += [*made, *rotor_notes(found.final.point)]
     values = found.evidence.noise.values
     notes.append(f'estimated disturbances (standard deviation): force {values["force"]:.2g} '
                  f'N, yaw moment {values["moment"]:.2g} N·m, torque on the wheels of each side '

@@ -21,7 +21,7 @@ from lg_husky_sim.diagnosis.settings import setting
 
 
 def with_any_rotors(point: Point) -> Point:
-    """Return a point whose wheel inertia is known no better than that of robots of any rotors."""
+    """Return a point whose wheel inertia is known no better than if it left rotors out."""
     spread = setting('rotor_spread')
     return replace(point, unknowns=tuple(
         replace(u, deviation=max(u.deviation, spread)) if u.name == 'wheel_inertia' else u
@@ -30,7 +30,7 @@ def with_any_rotors(point: Point) -> Point:
 
 def other_rotors(evidence: Evidence, base: Fit) -> Fit | None:
     """
-    Return a model with another wheel inertia where that is likelier than chance has it.
+    Return a model with a larger wheel inertia where that is likelier than chance has it.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def other_rotors(evidence: Evidence, base: Fit) -> Fit | None:
     Returns
     -------
     Fit or None
-        None where the base has any inertia already, or nothing says that it is another one.
+        None where the base may have any inertia already, or nothing says that it is larger.
 
     """
     point = with_any_rotors(base.point)
@@ -53,4 +53,17 @@ def other_rotors(evidence: Evidence, base: Fit) -> Fit | None:
     starts = [point, nominal_of(point)] if is_distorted(base) else [point]
     best = min(map(evidence.fit, starts), key=lambda fit: fit.cost)
     by_chance = wider - math.log(setting('false_alarm_rate'))
-    return best if base.cost - best.cost > by_chance else None
+    # What was left out can only be more.
+    more = any(u.name == 'wheel_inertia' and place > u.centre for u, place in zip(
+        best.point.unknowns, best.point.places.tolist(), strict=True))
+    return best if more and base.cost - best.cost > by_chance else None
+
+
+def rotor_notes(point: Point) -> tuple[str, ...]:
+    """Return in a sentence what a fit has for the wheel inertia, where it may be any."""
+    spread = setting('rotor_spread')
+    return tuple(
+        f'the wheels of each side seem to have an inertia of {u.value(place):.2g} kg·m², not '
+        f'{u.value(u.centre):.2g} kg·m²: rotors count by the square of their gear ratio'
+        for u, place in zip(point.unknowns, point.places.tolist(), strict=True)
+        if u.name == 'wheel_inertia' and u.deviation == spread)

@@ -1,0 +1,104 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Robots whose motors turn other rotors than the nominal wheel inertia has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from lg_husky_sim.comparison.output import simulate_commands
+from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.selection.recalibration import as_logged
+from lg_husky_sim.diagnosis.selection.rotors import other_rotors, rotor_notes
+from lg_husky_sim.husky.model import compile_model
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.manoeuvres import Manoeuvre, Step
+from lg_husky_sim.recording import Recording
+from lg_husky_sim.signals import TimeSeries
+from lg_husky_sim.threads import Threads
+import numpy as np
+import pytest
+
+#: Numbers within the tolerances, over those of the model.
+OFF = {'wheel_damping': 1.2, 'yaw_damping': 0.85, 'mass': 1.04, 'yaw_inertia': 0.95,
+       'motor_resistance': 0.97}
+#: Sensors that see a rotor.
+NOISE = {'wheels': 0.006, 'imu': 0.0015, 'pose': 0.001}
+
+
+def driven(factor: float, seed: int) -> Recording:
+    """Return a drive of a robot whose wheels have a multiple of the nominal inertia."""
+    model, random = load_model(), np.random.default_rng(seed)
+    plant = compile_model(model.structure).at(model.parameters.replacing({
+        name: share * model.parameters[name]
+        for name, share in {**OFF, 'wheel_inertia': factor}.items()}))
+    steps = [(float(random.uniform(0.4, 2.0)), *random.uniform(-0.8, 0.8, 2).tolist())
+             for _ in range(16)]
+    script = Manoeuvre('random', tuple(Step(*one, 0.2) for one in (
+        (1.0, 0.0, 0.0), *steps, (1.0, 0.0, 0.0))))
+    seen = simulate_commands(plant, script.commands(), 1.0)
+    noisy = {name: TimeSeries(seen[name].times, seen[name].values + deviation
+                              * random.standard_normal(seen[name].values.shape), seen[name].names)
+             for name, deviation in NOISE.items()}
+    return Recording(f'rec{seed}', f'rec{seed}', {'command': seen['command'], **noisy}, 0,
+                     frames=('odom', 'base_link'))
+
+
+@pytest.fixture
+def pool() -> Iterator[Threads]:
+    """Return one thread."""
+    with Threads(1) as threads:
+        yield threads
+
+
+def begun(factor: float, pool: Threads) -> tuple[Evidence, Fit]:
+    """Return the nominal model of such a robot, after one step, under a first guess of noise."""
+    recording, model = driven(factor, 0), load_model()
+    drives = drives_of([recording])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    evidence = evidence_of(drives, [recording.name], start, first_guess(drives), pool)
+    return evidence, evidence.fit(start, rounds=1)
+
+
+@pytest.mark.parametrize('factor', [2.0, 4.0])
+def test_other_rotors_are_found_and_said(pool: Threads, factor: float) -> None:
+    nominal = load_model().parameters['wheel_inertia']
+    fit = other_rotors(*begun(factor, pool))
+    assert fit is not None
+    assert fit.point.values['wheel_inertia'] == pytest.approx(factor * nominal, rel=0.1)
+    said, = rotor_notes(fit.point)
+    assert f'not {nominal:.2g} kg' in said
+
+
+@pytest.mark.parametrize('factor', [1.0, 0.4])
+def test_the_nominal_inertia_stays_where_nothing_says_that_it_is_larger(
+        pool: Threads, factor: float) -> None:
+    evidence, rough = begun(factor, pool)
+    assert other_rotors(evidence, evidence.fit(rough.point)) is None
+    assert rotor_notes(rough.point) == ()
+
+
+def test_a_slow_robot_is_not_taken_for_slow_sensors(pool: Threads) -> None:
+    """Low passes of the wheel rates and of the yaw rate were found for it, of 10 ms and 9 ms."""
+    evidence, rough = begun(4.0, pool)
+    logged = as_logged(evidence, rough, afresh=True)
+    assert logged.fit.point.reading == Reading()
+    assert logged.fit.point.values['wheel_inertia'] > 3.5 * rough.point.parameters['wheel_inertia']
+
+
+def test_a_robot_of_twice_the_inertia_lacks_nothing() -> None:
+    """It was said to carry -11 kg."""
+    said = diagnose([driven(2.0, seed) for seed in (0, 1)], load_model(),
+                    lambda text, share: None).diagnosis
+    assert said.verdict is Verdict.NOTHING_MISSING
+    inertia = next(e for e in said.recalibration if e.name == 'wheel_inertia')
+    assert inertia.value == pytest.approx(0.16, rel=0.1)
+    assert any('rotors count' in note for note in said.notes)
