@@ -140,7 +140,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
             progress('another robot: what differs', 0.92)
             sized = ModelFile(start.structure, start.numbers)
             said = _of_other_robot(said, model_mismatch(
-                different, found, said.held_out_plain, recordings, parts, sized, there, pool))
+                different, said.held_out_plain, recordings, parts, sized, there, pool))
     sensors = tuple(f.statement for f in seen)
     notes = (*said.notes, *_supplied(nominal, numbers), *_mended(recordings))
     said = with_nominal(replace(said, notes=notes, sensors=sensors), nominal, parts, names)

@@ -54,7 +54,7 @@ def unsearched(evidence: Evidence, start: Point) -> Search:
     return Search(plain, plain, evidence, (Round(evidence, plain, (), False, 1.0),), ())
 
 
-def model_mismatch(found: Sequence[Difference], search: Search, plain_out: Mapping[str, float],
+def model_mismatch(found: Sequence[Difference], plain_out: Mapping[str, float],
                    recordings: Sequence[Recording], parts: Sequence[Segment], nominal: ModelFile,
                    faults: Sequence[Fault], pool: Executor) -> ModelMismatch:
     """
@@ -64,8 +64,6 @@ def model_mismatch(found: Sequence[Difference], search: Search, plain_out: Mappi
     ----------
     found : sequence of Difference
         At least one.
-    search : Search
-        Not used: names of effects mean nothing on another robot.
     plain_out : mapping of str to float
         Errors of the recalibrated model on held-out data.
     recordings : sequence of Recording

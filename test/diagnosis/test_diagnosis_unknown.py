@@ -86,7 +86,7 @@ def test_an_effort_too_small_to_count_is_not_missing(fitted: tuple[Evidence, Fit
     search = Search(fit, fit, evidence, (Round(evidence, fit, (), False, 1.0),), ())
 
     def said(size: float) -> Verdict:
-        effort = Effort('force', 'x', 60.0, 60.0, 0.0, 1.0, np.linspace(-size, size, 9),
+        effort = Effort('force', 'x', 60.0, 60.0, np.linspace(-size, size, 9),
                         np.full(9, 0.01), size)
         return answer(search, [effort], []).verdict
     assert said(0.37) is Verdict.NOTHING_MISSING
@@ -103,7 +103,7 @@ def test_a_name_is_not_said_beside_a_larger_effort_without_one(
     search = Search(fit, fit, evidence, (Round(evidence, fit, (tried,), True, 1e-9),), (slope,))
 
     def said(explained: float) -> tuple[Verdict, float]:
-        effort = Effort('moment', 'yaw', explained, explained, 0.0, 1.0, np.linspace(-9.0, 9.0, 9),
+        effort = Effort('moment', 'yaw', explained, explained, np.linspace(-9.0, 9.0, 9),
                         np.full(9, 0.01), 9.0)
         found = answer(search, [effort], [])
         return found.verdict, found.sure

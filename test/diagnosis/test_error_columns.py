@@ -168,5 +168,5 @@ def test_all_that_differs_is_said_in_sentences_of_its_own() -> None:
     said = model_mismatch(
         [Difference('traction', (), 'everywhere', words, 9.0, comparable=False)
          for words in ('There is no ground reaction. It is lifted', 'its wheels are large')],
-        nothing, {}, (), (), nothing, (), nothing).finding.statement
+        {}, (), (), nothing, (), nothing).finding.statement
     assert said == 'There is no ground reaction. It is lifted. Its wheels are large.'

@@ -39,10 +39,10 @@ def driven(factor: float, seed: int) -> Recording:
     plant = compile_model(model.structure).at(model.parameters.replacing({
         name: share * model.parameters[name]
         for name, share in {**OFF, 'wheel_inertia': factor}.items()}))
-    steps = [(float(random.uniform(0.4, 2.0)), *random.uniform(-0.8, 0.8, 2).tolist())
-             for _ in range(16)]
-    script = Manoeuvre('random', tuple(Step(*one, 0.2) for one in (
-        (1.0, 0.0, 0.0), *steps, (1.0, 0.0, 0.0))))
+    steps = [Step(float(random.uniform(0.4, 2.0)), float(random.uniform(-0.8, 0.8)),
+                  float(random.uniform(-0.8, 0.8)), 0.2) for _ in range(16)]
+    still = Step(1.0, 0.0, 0.0, 0.2)
+    script = Manoeuvre('random', (still, *steps, still))
     seen = simulate_commands(plant, script.commands(), 1.0)
     noisy = {name: TimeSeries(seen[name].times, seen[name].values + deviation
                               * random.standard_normal(seen[name].values.shape), seen[name].names)

@@ -230,5 +230,5 @@ def _line(evidence: Evidence, projection: Projection, motions: Sequence[Motion],
         top += frame.times.size
     normal, slope = projection.problem(columns)
     values = np.asarray(np.linalg.lstsq(normal, slope, rcond=1e-9)[0], dtype=np.float64)
-    return Line(balance, name, gain, 0.5 * float(values @ slope), 0.0, period, values,
+    return Line(balance, name, gain, 0.5 * float(values @ slope), values,
                 np.zeros(0), float(np.max(np.hypot(values[::2], values[1::2]))), period)

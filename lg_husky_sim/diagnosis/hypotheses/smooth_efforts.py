@@ -100,11 +100,9 @@ class Effort:
         Log evidence against no effort, of innovations that are not quite white [nats].
     explained : float
         The same of white ones: what it explains beside an effect.
-    low, high : float
-        Range of the quantity [its unit].
     values, deviations : numpy.ndarray, shape (n_knots,)
-        At evenly spaced knots over the range [unit of the balance]; of a past motion what a
-        second of its signal does.
+        At evenly spaced knots over the range of the quantity [unit of the balance]; of a past
+        motion what a second of its signal does.
     largest : float
         Largest size in these drives [unit of the balance].
 
@@ -114,8 +112,6 @@ class Effort:
     argument: str
     evidence: float
     explained: float
-    low: float
-    high: float
     values: FloatArray
     deviations: FloatArray
     largest: float
@@ -302,7 +298,6 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
         sided = [q if side == 'none' or q in _COMMON else f'{q}_{side}' for q in (*over, rate)]
         names, own_rate = sided[:-1], sided[-1]
         ranges = [span(*pair) for pair in zip(over, names, strict=True)]
-        low, high = ranges[0]
         count = int(setting('smooth_knots' if len(over) == 1 else 'patch_knots'))
         parts, shapes = [], []
         for one, whitener in zip(known, evidence.whiteners, strict=True):
@@ -324,7 +319,7 @@ def efforts(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
         columns, shapes = columns[:, seen], [shape[:, seen] for shape in shapes]
         gain, explained, sizes, deviations = beyond_chance(evidence, fit, projection, columns)
         largest = max(float(np.max(np.abs(shape @ sizes))) for shape in shapes)
-        return Effort(balance, argument, gain, explained, low, high, sizes, deviations, largest)
+        return Effort(balance, argument, gain, explained, sizes, deviations, largest)
     tasks = [*((b, a) for b in BALANCES for a in ARGUMENTS[b]),
              *((b, argument) for b, (*_, own) in READINGS.items() for argument in own)]
     found = [one for one in evidence.pool.map(one_of, tasks) if one is not None]

@@ -112,8 +112,8 @@ def swings(evidence: Evidence, fit: Fit) -> tuple[Swing, ...]:
         gain, explained, values, deviations = beyond_chance(evidence, fit, projection, columns)
         largest = max(float(np.max(np.abs(shape @ part))) for shape, part in zip(
             shapes, np.split(values, len(shapes)), strict=True))
-        return Swing('force', 'time', gain - penalty, explained, 0.0, 1.0 / frequency, values,
-                     deviations, largest, 1.0 / frequency)
+        return Swing('force', 'time', gain - penalty, explained, values, deviations,
+                     largest, 1.0 / frequency)
     found = max(evidence.pool.map(at, frequencies.tolist()), key=lambda one: one.evidence,
                 default=None)
     return (found,) if found is not None and found.evidence > 0.0 else ()
