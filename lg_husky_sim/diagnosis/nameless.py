@@ -21,6 +21,7 @@ from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import (
     READINGS,
 )
 from lg_husky_sim.diagnosis.hypotheses.swings import Swing, swings
+from lg_husky_sim.diagnosis.hypotheses.waves import Wave, waves
 from lg_husky_sim.diagnosis.localisation import Missing
 from lg_husky_sim.diagnosis.result import Finding
 from lg_husky_sim.diagnosis.rivals import rivals_of
@@ -59,10 +60,11 @@ def left_over(evidence: Evidence, fit: Fit) -> tuple[Effort, ...]:
     Returns
     -------
     tuple of Effort
-        Smooth ones, those that repeat and those that swing, largest evidence first.
+        Smooth ones, those that repeat, that swing or belong to waves, largest evidence first.
 
     """
-    return tuple(sorted([*efforts(evidence, fit), *lines(evidence, fit), *swings(evidence, fit)],
+    looks = (efforts, lines, swings, waves)
+    return tuple(sorted((one for look in looks for one in look(evidence, fit)),
                         key=lambda one: -one.evidence))
 
 
@@ -176,6 +178,9 @@ def described(effort: Effort) -> str:
     if isinstance(effort, Swing):
         return (f'{where} that swings every {effort.period:.3g} s in a fixed direction, as on a '
                 'deck that tilts')
+    if isinstance(effort, Wave):
+        return (f'{where} of waves of the ground, {effort.period:.3g} m long, at '
+                f'{math.degrees(effort.way):.0f}° to the x axis of the map')
     if effort.argument in PAST:
         return f'{where} that follows {PAST[effort.argument][2]}'
     if effort.argument in RATED:
