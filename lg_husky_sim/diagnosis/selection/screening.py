@@ -232,18 +232,16 @@ def settled(whitened: FloatArray, columns: FloatArray, start: FloatArray,
     before, gain, best = student.cost(whitened), 0.0, start
     own = start
     for _ in range(int(setting('reweighted_looks'))):
-        left = whitened - columns @ own
-        promised = before - student.cost(left)
+        spent, normal, slope = student.reweighted(whitened, columns, own)
+        promised = before - spent
         if promised > gain:
             gain, best = promised, own
-        weight = student.weights(left)
-        normal = normal_matrix(columns, weight)
         size = np.sqrt(np.maximum(np.diag(normal), 0.0))
         if not np.all(np.isfinite(size)) or np.any(size <= setting('rounding')):
             break
         own = np.clip(np.linalg.solve(
             normal / np.outer(size, size) + 1e-9 * np.eye(size.size),
-            (weight * whitened) @ columns / size) / size, low, high)
+            slope / size) / size, low, high)
     return gain, best
 
 
