@@ -13,7 +13,14 @@ import sys
 import traceback
 from typing import Any
 
-import click
+try:
+    import click
+except ModuleNotFoundError as error:
+    # A ROS workspace whose dependencies were not installed: the node runs, the verbs do not.
+    if error.name != 'click':
+        raise
+    sys.exit('error: click is needed for lg_husky and is not installed: pip install click, or '
+             'with ROS sudo apt install python3-click')
 from lg_husky_sim.blas import set_one_thread
 from lg_husky_sim.errors import LgHuskyError, SEVERAL
 

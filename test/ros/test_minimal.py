@@ -46,6 +46,18 @@ def test_the_node_runs_without_anything_optional(tmp_path: Path) -> None:
     assert done.stdout == '10 True\n'
 
 
+def test_the_command_line_says_in_a_line_what_it_lacks() -> None:
+    """Row 58: where rosdep was not run, lg_husky ended in a traceback."""
+    done = subprocess.run(
+        [sys.executable, '-c', "import sys; sys.modules['click'] = None\n"
+         'from lg_husky_sim.cli.main import main; main()'], text=True, capture_output=True,
+        timeout=60.0, check=False)
+    assert (done.returncode, done.stdout) == (1, '')
+    assert done.stderr == (
+        'error: click is needed for lg_husky and is not installed: pip install click, or with ROS '
+        'sudo apt install python3-click\n')
+
+
 def test_package_xml_has_what_reads_and_writes_bags() -> None:
     """Row 20: with ROS, rosbag2_py is the backend; rosdep has no key for rosbags."""
     manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
