@@ -172,9 +172,10 @@ def test_clock_and_identical_trajectory_at_every_speed(probe: Probe, start: Star
 
 
 def test_a_parameter_file_and_the_command_line(probe: Probe, start: Start, tmp_path: Path) -> None:
-    """Files and -p are taken, whole numbers count as decimals, the command line wins."""
+    """Files and -p are taken, whole numbers count as decimals, the command line wins (row 57)."""
     path = write_parameters(tmp_path / 'p.yaml', '/**', {
-        'rate': 25, 'initial_x': 4.0, 'odom_frame': 'world', 'ground_truth_topic': '/from_file'})
+        'robot_description': '<robot/>', 'rate': 25, 'initial_x': 4.0, 'odom_frame': 'world',
+        'ground_truth_topic': '/from_file'})
     truth = probe.listen('nav_msgs/msg/Odometry', '/from_file')
     husky = start(('--params-file', str(path)), initial_x=5)
     husky.ready(truth)

@@ -122,6 +122,48 @@ def test_commands_stay_within_the_limits_and_an_error_stops_the_robot(probe: Pro
     assert said == [f'{COMMAND} moves /probe (Twist); at most 1 m/s, at most 2 rad/s']
 
 
+def test_playing_that_is_ended_stops_the_robot(probe: Probe, tmp_path: Path) -> None:
+    """Row 16: as a drive does, and within the limits of the preset."""
+    pytest.importorskip('rosbags')
+    from lg_husky_sim.recording import write_recording
+    times = np.arange(1200) * np.float64(0.05)
+    write_recording(tmp_path / 'bag', {
+        'command': TimeSeries(times, np.tile([3.0, 0.3], (1200, 1)), ('forward', 'yaw')),
+        'wheels': TimeSeries(times, np.zeros((1200, 2)), ('left', 'right'))})
+    heard = probe.listen('geometry_msgs/msg/Twist', COMMAND)
+    player = run('play', tmp_path / 'bag', '--preset', 'husky_ros1', '--wait', '60')
+    try:
+        assert probe.until(lambda: len(heard) > 10, 90.0), player.poll()
+        player.send_signal(signal.SIGTERM)
+        assert probe.until(lambda: ended_with_zeros(heard), 15.0), speeds(heard)[-3:]
+        _, said = player.communicate(timeout=15.0)
+    finally:
+        player.kill()
+        player.wait()
+    assert set(speeds(heard)) == {(1.0, 0.3), (0.0, 0.0)}
+    assert f'{COMMAND} moves /probe (Twist); at most 1 m/s, at most 2 rad/s' in said.splitlines()
+
+
+def test_all_waits_of_a_tool_are_alike(probe: Probe, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Row 53: rclpy drops who is ready whenever the wait changes, and serves the first only."""
+    tool = Tool('lg_husky_recorder', Orderly())
+    waits: list[float] = []
+    for one in (tool, probe):
+        def spin_once(timeout_sec: float, once: Any = one._executor.spin_once) -> None:
+            waits.append(timeout_sec)
+            once(timeout_sec=timeout_sec)
+        monkeypatch.setattr(one._executor, 'spin_once', spin_once)
+    try:
+        tool.serve()
+        tool.serve_until(tool.now() + 0.137)
+        probe.spin(0.033)
+        probe.until(lambda: len(waits) > 20, 0.5)
+    finally:
+        tool.close()
+    assert len(waits) > 8
+    assert len(set(waits)) == 1
+
+
 def test_a_recorder_is_no_robot_and_another_type_is_named(probe: Probe, tmp_path: Path) -> None:
     """Who only listens is not moved; Twist and TwistStamped do not hear each other."""
     tool = Tool('lg_husky_recorder', Orderly())

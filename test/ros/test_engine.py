@@ -73,8 +73,11 @@ def test_preset_limits_shape_the_motion() -> None:
 
 def test_rest_is_rest() -> None:
     """No creep: without a command nothing moves, to the last bit."""
-    drive = LockStepHusky().drive(BodyTwist(), 60.0)
+    husky = LockStepHusky()
+    drive = husky.drive(BodyTwist(), 60.0)
     assert np.all(drive.values == 0.0)
+    # Row 58: -0.0 A were shown.
+    assert math.copysign(1.0, husky.reading.current) == 1.0
 
 
 def test_wheel_angles_integrate_the_rates_to_a_nanoradian() -> None:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from lg_husky_sim.errors import MissingExtraError, SettingsError
-from lg_husky_sim.testing.live import LiveHusky, Probe
+from lg_husky_sim.testing.live import isolated_domain, LiveHusky, Probe
 import pytest
 
 
@@ -26,3 +26,12 @@ def test_a_message_whose_package_is_missing_is_named(
         probe.listen('tf2_msgs/msg/TFMessage', '/tf')
     with pytest.raises(MissingExtraError, match=wanted):
         probe.talk('tf2_msgs/msg/TFMessage', '/tf')
+
+
+def test_the_domain_of_the_user_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Row 58: a robot may be in the domain of the shell from which tests are run."""
+    with isolated_domain() as free:
+        pass
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(free))
+    with isolated_domain() as other:
+        assert other != free

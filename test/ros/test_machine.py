@@ -49,9 +49,11 @@ def test_of_another_kind():
     (['late'] * 3, 1, False, True, '1 failed, 1 passed'),
 ])
 def test_failures_on_a_disturbed_machine_are_asked_again(
-        told: list[str], passes_at: int, other: bool, watches: bool, wanted: str, tmp_path: Path
-) -> None:
+        told: list[str], passes_at: int, other: bool, watches: bool, wanted: str, tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip('pytest_rerunfailures')
+    # Row 54: what colcon gives the outer pytest made the one below run all of test/ros.
+    monkeypatch.setenv('PYTEST_ADDOPTS', '--collect-only')
     (tmp_path / 'conftest.py').write_text(
         CONFTEST.format(told=told, watches=watches), encoding='utf-8')
     (tmp_path / 'test_it.py').write_text(

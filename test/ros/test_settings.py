@@ -24,6 +24,15 @@ def test_table_dataclass_and_presets_name_the_same_parameters() -> None:
         assert make_settings(preset=preset).preset == preset
 
 
+def test_every_topic_follows_the_namespace() -> None:
+    """Row 55: with absolute topics two robots drove by one command, or by one click in RViz."""
+    for preset in BY_NAME['preset'].choices:
+        values = preset_values(preset)
+        topics = {name: values[name] for name in values if name.endswith('_topic')}
+        assert len(topics) > 7
+        assert {name for name, topic in topics.items() if str(topic).startswith('/')} == set()
+
+
 def test_the_sample_parameter_file_holds_the_defaults() -> None:
     """config/sim_node.yaml changes nothing when it is given to the node."""
     data = read_yaml(config_path('sim_node.yaml'), SettingsError)

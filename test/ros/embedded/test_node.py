@@ -206,6 +206,25 @@ def test_simulated_time_follows_the_clock_topic(graph: None) -> None:
         assert node.get_clock().now() == Time(seconds=second)
 
 
+def test_a_node_that_takes_the_place_of_another_is_heard(graph: None) -> None:
+    """Row 38: without timers, one that has as many ends as the other had was not waited for."""
+    talker = Node('talker').create_publisher(STRING, 'text', 10)
+    executor = SingleThreadedExecutor()
+    heard: list[str] = []
+    for name in ('first', 'second'):
+        node = Node(name)
+        node.create_subscription(STRING, 'text', lambda one: heard.append(one.data), 10)
+        executor.add_node(node)
+        end = time.monotonic() + 10.0
+        while name not in heard and time.monotonic() < end:
+            # Sent while nobody waits, or a first look would find it.
+            executor.spin_once(timeout_sec=0.05)
+            talker.publish(STRING(data=name))
+            executor.spin_once(timeout_sec=0.05)
+        executor.remove_node(node)
+    assert heard[-1] == 'second'
+
+
 @pytest.mark.realtime
 def test_shutdown_ends_spinning(graph: None) -> None:
     """Spinning stops with ExternalShutdownException when the context goes."""
