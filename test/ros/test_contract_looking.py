@@ -38,6 +38,8 @@ def test_huskies_are_found_by_names_and_types_together() -> None:
     assert find_robots(TOPICS, preset='paper') == ()
     assert find_robots(TOPICS, namespace='a200_0000') == (robot,)
     assert the_one(find_robots({})) is None
+    fleet = {f'/{name}/platform/odom': ['nav_msgs/msg/Odometry'] for name in 'cab'}
+    assert [one.namespace for one in find_robots(fleet)] == ['/a', '/b', '/c']
     both = TOPICS | {f'/{make_settings(preset="husky_ros1").odometry_topic}': [
         'nav_msgs/msg/Odometry'], '/imu/data': ['sensor_msgs/msg/Imu']}
     with pytest.raises(SettingsError, match='2 Huskies are in the graph, choose one: --preset '
