@@ -93,6 +93,50 @@ def test_an_effect_that_begins_at_a_place_begins_there_live(robot: Maker) -> Non
     assert found['model'] < 0.25 * min(found['always'], found['plain'])
 
 
+@pytest.mark.parametrize(('effect', 'values', 'known'), [
+    (Effect('torque_ripple', 'both'), {'ripple_cos': 6.0, 'ripple_sin': 4.0}, 'angles'),
+    (Effect('slope'), {'slope_x': -60.0, 'slope_y': 30.0}, 'pose')])
+def test_a_model_begins_as_the_robot_stands(
+        robot: Maker, effect: Effect, values: dict[str, float], known: str) -> None:
+    """Row 33: it began at pose 0 and wheel angle 0; neither is corrected here later on."""
+    plant = robot(effect, **values)
+    told, found = BodyTwist(0.5, 0.3), {}
+    for missing in ('', known):
+        truth, shadow = Simulator(plant, PERIOD), Shadow(plant)
+        state = truth.initial(Pose(1.0, -2.0, 0.8), wheel_angles=(2.0, 0.5))
+        for _ in range(300):
+            state = truth.step(state, told)
+        shadow.command(0.0, told)
+        if missing != 'pose':
+            shadow.place(state.pose)
+        shadow.wheels(state.time, *state.wheel_rates,
+                      state.wheel_angles if missing != 'angles' else None)
+        for _ in range(30):
+            state = truth.step(state, told)
+            shadow.wheels(state.time + 1e-7, *state.wheel_rates)
+        found[missing] = shadow.errors['wheel_rate'].overall
+    assert found[''] < 0.5 * found[known]
+
+
+def test_a_ripple_stays_in_phase_with_the_wheels(robot: Maker) -> None:
+    """Row 33: JointState.position was not taken; a model that rolls a little less falls behind."""
+    ripple = {'ripple_cos': 6.0, 'ripple_sin': 4.0}
+    effect = Effect('torque_ripple', 'both')
+    truth = Simulator(robot(effect, **ripple, wheel_damping=2.1), PERIOD)
+    shadows = {known: Shadow(robot(effect, **ripple)) for known in (True, False)}
+    state, told = truth.initial(), BodyTwist(0.6, 0.2)
+    for shadow in shadows.values():
+        shadow.command(0.0, told)
+        shadow.wheels(0.0, 0.0, 0.0, (0.0, 0.0))
+    for _ in range(2500):
+        state = truth.step(state, told)
+        for known, shadow in shadows.items():
+            shadow.wheels(state.time + 1e-7, *state.wheel_rates,
+                          state.wheel_angles if known else None)
+    overall = {known: one.errors['wheel_rate'].overall for known, one in shadows.items()}
+    assert overall[True] < 0.7 * overall[False]
+
+
 def test_a_late_message_is_compared_with_its_own_moment(robot: Maker) -> None:
     """A command that overtakes a measurement on its way changes nothing about it."""
     plant = robot()
