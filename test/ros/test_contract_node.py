@@ -94,6 +94,10 @@ def test_stamps_go_on_after_steps_while_paused(probe: Probe, made: list[SimNode]
     assert probe.until(lambda: node.engine.total == done + 500)
     node.pause(False)
     assert probe.until(lambda: node.engine.total > done + 510)
+    # Not held until the clock has come as far, either.
+    probe.spin(0.1)
+    held = [stamp(b) - stamp(a) for a, b in itertools.pairwise(truth[-6:])]
+    assert held == [pytest.approx(20_000_000, abs=1)] * 5
     node.change(speed=0.0)
     probe.spin(0.1)
     node.change(speed=1.0)

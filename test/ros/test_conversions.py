@@ -109,3 +109,6 @@ def test_the_battery_says_the_voltage_that_the_motors_get(
         drawn += duty * current
     assert (reading.voltage < 23.99) == bool(names)
     assert reading.current == pytest.approx(-drawn, rel=1e-3)
+    message = conversions.battery_message(make_settings())
+    conversions.fill_battery(message, 0, reading)
+    assert (message.voltage, message.current) == pytest.approx((reading.voltage, reading.current))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import struct
+import threading
 import time
 from typing import Any
 
@@ -210,19 +211,19 @@ def test_a_node_that_takes_the_place_of_another_is_heard(graph: None) -> None:
     """Row 38: without timers, one that has as many ends as the other had was not waited for."""
     talker = Node('talker').create_publisher(STRING, 'text', 10)
     executor = SingleThreadedExecutor()
-    heard: list[str] = []
-    for name in ('first', 'second'):
-        node = Node(name)
+    nodes, heard = [Node('first'), Node('second')], list[str]()
+    for node in nodes:
+        name = node.get_fully_qualified_name()
         node.create_subscription(STRING, 'text', lambda one: heard.append(one.data), 10)
         executor.add_node(node)
-        end = time.monotonic() + 10.0
-        while name not in heard and time.monotonic() < end:
-            # Sent while nobody waits, or a first look would find it.
-            executor.spin_once(timeout_sec=0.05)
-            talker.publish(STRING(data=name))
-            executor.spin_once(timeout_sec=0.05)
+        spin_for(executor, 0.3)
+        # While it waits: what is there already is found by a first look.
+        later = threading.Timer(0.3, lambda name=name: talker.publish(STRING(data=name)))
+        later.start()
+        executor.spin_once(timeout_sec=5.0)
+        later.join()
         executor.remove_node(node)
-    assert heard[-1] == 'second'
+    assert heard == ['/first', '/second']
 
 
 @pytest.mark.realtime
