@@ -209,21 +209,23 @@ def test_simulated_time_follows_the_clock_topic(graph: None) -> None:
 
 def test_a_node_that_takes_the_place_of_another_is_heard(graph: None) -> None:
     """Row 38: without timers, one that has as many ends as the other had was not waited for."""
-    talker = Node('talker').create_publisher(STRING, 'text', 10)
+    talker = Node('talker')
     executor = SingleThreadedExecutor()
     nodes, heard = [Node('first'), Node('second')], list[str]()
     for node in nodes:
-        name = node.get_fully_qualified_name()
-        node.create_subscription(STRING, 'text', lambda one: heard.append(one.data), 10)
+        # A topic of its own: what also reaches the first would end the wait.
+        topic = f'{node.get_fully_qualified_name()}/text'
+        publisher = talker.create_publisher(STRING, topic, 10)
+        node.create_subscription(STRING, topic, lambda one: heard.append(one.data), 10)
         executor.add_node(node)
         spin_for(executor, 0.3)
         # While it waits: what is there already is found by a first look.
-        later = threading.Timer(0.3, lambda name=name: talker.publish(STRING(data=name)))
+        later = threading.Timer(0.3, publisher.publish, [STRING(data=topic)])
         later.start()
         executor.spin_once(timeout_sec=5.0)
         later.join()
         executor.remove_node(node)
-    assert heard == ['/first', '/second']
+    assert heard == ['/first/text', '/second/text']
 
 
 @pytest.mark.realtime
