@@ -137,6 +137,33 @@ def test_a_ripple_stays_in_phase_with_the_wheels(robot: Maker) -> None:
     assert overall[True] < 0.7 * overall[False]
 
 
+@pytest.mark.parametrize(('effect', 'values', 'late', 'read'), [
+    (Effect('sensor_time_offset', shape='imu'), {'stamp_delay': 0.2}, 20, lambda rate: rate),
+    (Effect('gyro_scale'), {'gyro_factor': 0.8}, 0, lambda rate: 0.8 * rate),
+    (Effect('gyro_bias'), {'gyro_bias': 0.05}, 0, lambda rate: rate + 0.05)])
+def test_faults_of_the_gyro_are_in_what_a_model_reads(
+        robot: Maker, effect: Effect, values: dict[str, float], late: int,
+        read: Callable[[float], float]) -> None:
+    """Row 33: delays and faults that were found did not act on the yaw rate."""
+    truth = Simulator(robot(), PERIOD)
+    shadows = [Shadow(robot(effect, **values)), Shadow(robot())]
+    states, told = [truth.initial()], BodyTwist()
+    for shadow in shadows:
+        shadow.wheels(0.0, 0.0, 0.0, (0.0, 0.0))
+    for step in range(1200):
+        if commanded(step * PERIOD) != told:
+            told = commanded(step * PERIOD)
+            for shadow in shadows:
+                shadow.command(step * PERIOD, told)
+        states.append(truth.step(states[-1], told))
+        if step > late:
+            for shadow in shadows:
+                shadow.gyro(states[-1].time + 1e-7, read(states[-1 - late].twist.yaw))
+    found, plain = (shadow.errors['yaw_rate'].overall for shadow in shadows)
+    assert found < 0.25 * plain
+    assert plain > 0.01
+
+
 def test_a_late_message_is_compared_with_its_own_moment(robot: Maker) -> None:
     """A command that overtakes a measurement on its way changes nothing about it."""
     plant = robot()
