@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 import os
 from pathlib import Path
 import signal
@@ -25,6 +26,7 @@ from lg_husky_sim.ros import api
 from lg_husky_sim.ros.engine import Engine
 from lg_husky_sim.ros.outputs import Outputs
 from lg_husky_sim.ros.settings import make_settings
+from lg_husky_sim.ros.simulation_node import SimNode
 from lg_husky_sim.signals import BodyTwist
 from lg_husky_sim.simulation.compiling import compile_here
 from lg_husky_sim.testing.live import isolated_domain, Probe
@@ -77,6 +79,24 @@ def split() -> dict[str, float]:
     api.shutdown()
     return {'physics': physics, 'odometry, sensors': whole_engine - physics,
             'messages': building, 'serialising, middleware': sending - building}
+
+
+def waiting() -> dict[str, float]:
+    """Return what a wait of the executor costs where nothing has come [µs], by kind of node."""
+    api.init(args=[])
+    found = {}
+    for name, node in (('sim_node', SimNode('cost')), ('node without anything', api.Node('bare'))):
+        executor = api.SingleThreadedExecutor()
+        executor.add_node(node)
+        # rclpy's nodes have their timers as a property.
+        timers: Any = node.timers
+        for timer in list(timers if api.HAVE_RCLPY else timers()):
+            timer.cancel()
+        found[name] = microseconds(partial(executor.spin_once, timeout_sec=0.0), 1000)
+        executor.shutdown()
+        node.destroy_node()
+    api.shutdown()
+    return found
 
 
 def cpu_seconds(pid: int) -> float:
@@ -146,6 +166,9 @@ def main() -> None:
         for name, value in parts.items():
             print(f'  {name:26s}{value:8.1f} µs {value / whole:7.1%}')
         print(f'  {"all":26s}{whole:8.1f} µs')
+        print('a wait of the executor, nothing has come')
+        for name, value in waiting().items():
+            print(f'  {name:26s}{value:8.1f} µs')
         minimal = live([sys.executable, str(HERE / 'minimal_node.py'), str(given.rate)],
                        given.rate, given.seconds)
         node = live([sys.executable, '-m', 'lg_husky_sim.ros.sim_node', '--ros-args', '-p',
