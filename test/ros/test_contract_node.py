@@ -192,9 +192,14 @@ def test_several_robots_in_one_process(probe: Probe, made: list[SimNode]) -> Non
     """T8: two nodes of one process live in their namespaces and keep their own rates."""
     left = probe.listen('nav_msgs/msg/Odometry', '/left/ground_truth', 500)
     right = probe.listen('nav_msgs/msg/Odometry', '/right/ground_truth', 500)
+    # Row 55: two robots published one odom to base_link on one /tf.
+    kind = 'tf2_msgs/msg/TFMessage'
+    frames = {topic: probe.listen(kind, topic) for topic in ('/left/tf', '/right/tf', '/tf')
+              if api.message_type(kind)}
     one, two = add(probe, made, 'sim', '/left'), add(probe, made, 'sim', '/right')
     one.engine.command(BodyTwist(0.5, 0.0))
     assert probe.until(lambda: min(len(left), len(right)) > 30)
+    assert [bool(heard) for heard in frames.values()] == [True, True, False][:len(frames)]
     assert left[-1].pose.pose.position.x > 0.05
     assert right[-1].pose.pose.position.x == 0.0
     assert abs(one.engine.total - two.engine.total) < 60
