@@ -144,26 +144,6 @@ def test_playing_that_is_ended_stops_the_robot(probe: Probe, tmp_path: Path) -> 
     assert f'{COMMAND} moves /probe (Twist); at most 1 m/s, at most 2 rad/s' in said.splitlines()
 
 
-def test_all_waits_of_a_tool_are_alike(probe: Probe, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Row 53: rclpy drops who is ready whenever the wait changes, and serves the first only."""
-    tool = Tool('lg_husky_recorder', Orderly())
-    waits: list[float] = []
-    for one in (tool, probe):
-        def spin_once(timeout_sec: float, once: Any = one._executor.spin_once) -> None:
-            waits.append(timeout_sec)
-            once(timeout_sec=timeout_sec)
-        monkeypatch.setattr(one._executor, 'spin_once', spin_once)
-    try:
-        tool.serve()
-        tool.serve_until(tool.now() + 0.137)
-        probe.spin(0.033)
-        probe.until(lambda: len(waits) > 20, 0.5)
-    finally:
-        tool.close()
-    assert len(waits) > 8
-    assert len(set(waits)) == 1
-
-
 def test_a_recorder_is_no_robot_and_another_type_is_named(probe: Probe, tmp_path: Path) -> None:
     """Who only listens is not moved; Twist and TwistStamped do not hear each other."""
     tool = Tool('lg_husky_recorder', Orderly())

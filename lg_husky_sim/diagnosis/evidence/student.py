@@ -39,7 +39,7 @@ def costs(whitened: FloatArray) -> FloatArray:
 
 def cost(whitened: FloatArray) -> float:
     """Return what all innovations cost together [nats]."""
-    return float(_cost(np.ravel(whitened), setting('student')))
+    return float(_cost(np.ravel(whitened), setting('student'), setting('product_full')))
 
 
 def weights(whitened: FloatArray) -> FloatArray:
@@ -76,24 +76,21 @@ def reweighted(whitened: FloatArray, columns: FloatArray, sizes: FloatArray
     normal, slope = np.zeros((sizes.size, sizes.size)), np.zeros(sizes.size)
     spent = float(_reweighted(
         np.ascontiguousarray(whitened), np.ascontiguousarray(columns),
-        np.ascontiguousarray(sizes), setting('student'), normal, slope))
+        np.ascontiguousarray(sizes), setting('student'), setting('product_full'), normal, slope))
     return spent, normal, slope
 
 
-# Logarithms are dear: one of a product of as many terms as a number can hold.
-_FULL = 1e100
-
-
 @jit
-def _cost(whitened: FloatArray, nu: float) -> float:
+def _cost(whitened: FloatArray, nu: float, full: float) -> float:
+    # Logarithms are dear: one of a product of as many terms as a number can hold.
     total, product = 0.0, 1.0
     for k in range(whitened.size):
         term = 1.0 + whitened[k] * whitened[k] / nu
-        if term > _FULL:
+        if term > full:
             total += np.log(term)
         else:
             product *= term
-            if product > _FULL:
+            if product > full:
                 total += np.log(product)
                 product = 1.0
     found: float = 0.5 * (nu + 1.0) * (total + np.log(product))
@@ -102,7 +99,7 @@ def _cost(whitened: FloatArray, nu: float) -> float:
 
 @jit
 def _reweighted(whitened: FloatArray, columns: FloatArray, sizes: FloatArray, nu: float,
-                normal: FloatArray, slope: FloatArray) -> float:
+                full: float, normal: FloatArray, slope: FloatArray) -> float:
     total, product = 0.0, 1.0
     count = sizes.size
     for k in range(whitened.size):
@@ -110,11 +107,11 @@ def _reweighted(whitened: FloatArray, columns: FloatArray, sizes: FloatArray, nu
         for i in range(count):
             left -= columns[k, i] * sizes[i]
         term = 1.0 + left * left / nu
-        if term > _FULL:
+        if term > full:
             total += np.log(term)
         else:
             product *= term
-            if product > _FULL:
+            if product > full:
                 total += np.log(product)
                 product = 1.0
         weight = (nu + 1.0) / (nu * term)
