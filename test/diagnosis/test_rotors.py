@@ -16,7 +16,11 @@ from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.selection.recalibration import as_logged
-from lg_husky_sim.diagnosis.selection.rotors import other_rotors, rotor_notes
+from lg_husky_sim.diagnosis.selection.rotors import (
+    other_rotors,
+    rotor_notes,
+    with_any_rotors,
+)
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
@@ -84,6 +88,12 @@ def test_the_nominal_inertia_stays_where_nothing_says_that_it_is_larger(
     evidence, rough = begun(factor, pool)
     assert other_rotors(evidence, evidence.fit(rough.point)) is None
     assert rotor_notes(rough.point) == ()
+    # Nor is it said of one that was free and ended where it was, or below.
+    free = with_any_rotors(rough.point)
+    for share, said in ((1.0, 0), (0.6, 0), (1.6, 1)):
+        there = free.at(np.array([u.place(share * 0.08) if u.name == 'wheel_inertia' else place
+                                  for u, place in zip(free.unknowns, free.places, strict=True)]))
+        assert len(rotor_notes(there)) == said
 
 
 def test_a_slow_robot_is_not_taken_for_slow_sensors(pool: Threads) -> None:

@@ -142,8 +142,10 @@ def level(power: FloatArray, waves: FloatArray, own: int, span: float) -> float:
     apart = np.minimum(np.hypot(*(waves - waves[own]).T), np.hypot(*(waves + waves[own]).T))
     reach = math.log(setting('wave_neighbours'))
     near = (np.abs(np.log(size / size[own])) < reach) & (apart > gap)
-    return math.exp(float(np.mean(np.log(power[near]))) + np.euler_gamma) if np.any(
-        near) else math.inf
+    if not np.any(near):
+        return math.inf
+    logs = np.log(np.maximum(power[near], 1e-300))
+    return math.exp(float(np.mean(logs)) + np.euler_gamma)
 
 
 def waves(evidence: Evidence, fit: Fit) -> tuple[Wave, ...]:

@@ -60,10 +60,12 @@ def other_rotors(evidence: Evidence, base: Fit) -> Fit | None:
 
 
 def rotor_notes(point: Point) -> tuple[str, ...]:
-    """Return in a sentence what a fit has for the wheel inertia, where it may be any."""
-    spread = setting('rotor_spread')
-    return tuple(
-        f'the wheels of each side seem to have an inertia of {u.value(place):.2g} kg·m², not '
-        f'{u.value(u.centre):.2g} kg·m²: rotors count by the square of their gear ratio'
-        for u, place in zip(point.unknowns, point.places.tolist(), strict=True)
-        if u.name == 'wheel_inertia' and u.deviation == spread)
+    """Return in a sentence what a fit has for the wheel inertia, where it is any larger one."""
+    spread, found = setting('rotor_spread'), []
+    for u, place in zip(point.unknowns, point.places.tolist(), strict=True):
+        nominal, value = (f'{u.value(one):.2g} kg·m²' for one in (u.centre, place))
+        if (u.name == 'wheel_inertia' and u.deviation == spread and place > u.centre
+                and value != nominal):
+            found.append(f'the wheels of each side seem to have an inertia of {value}, not '
+                         f'{nominal}: rotors count by the square of their gear ratio')
+    return tuple(found)
