@@ -17,7 +17,9 @@ Outcome = TypeVar('Outcome')
 
 class Threads(ThreadPoolExecutor):
     """
-    Threads whose tasks may map tasks of their own: those run in the thread that asks.
+    Threads whose tasks may map tasks of their own.
+
+    Those run in the thread that asks, and so do all that are mapped after the end.
 
     Parameters
     ----------
@@ -27,7 +29,7 @@ class Threads(ThreadPoolExecutor):
     """
 
     def __init__(self, jobs: int) -> None:
-        self._own = threading.local()
+        self._own, self._ended = threading.local(), False
         super().__init__(max(jobs, 1), initializer=self._enter)
 
     def _enter(self) -> None:
@@ -36,9 +38,14 @@ class Threads(ThreadPoolExecutor):
     def map(self, function: Callable[..., Outcome], *tasks: Iterable[Any],  # noqa: A003
             timeout: float | None = None, chunksize: int = 1) -> Iterator[Outcome]:
         """Return what a function makes of tasks, in their order."""
-        if getattr(self._own, 'busy', False):
+        if self._ended or getattr(self._own, 'busy', False):
             return iter([function(*one) for one in zip(*tasks, strict=False)])
         return super().map(function, *tasks, timeout=timeout, chunksize=chunksize)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the threads."""
+        self._ended = True
+        super().shutdown(wait, cancel_futures=cancel_futures)
 
 
 @contextmanager

@@ -66,8 +66,12 @@ class Case:
     segments : tuple of Segment
     nominal : ModelFile
         That was in doubt.
+    left : Search
+        The same under the noise that is fair to what it leaves.
     rest : tuple of Effort
-        Smooth efforts in what the search leaves.
+        Smooth efforts in that.
+    free : tuple of Missing
+        Efforts over time in that.
     features : Features
         That made the confidence.
 
@@ -77,7 +81,9 @@ class Case:
     search: Search
     segments: tuple[Segment, ...]
     nominal: ModelFile
+    left: Search
     rest: tuple[Effort, ...]
+    free: tuple[Missing, ...]
     features: Features
 
 
@@ -148,7 +154,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
              if 'forward_rmse' in one]
     if known:
         said = replace(said, notes=(*said.notes, *scatter_notes(parts, min(known))))
-    return Case(said, found, parts, nominal, rest, features)
+    return Case(said, found, parts, nominal, left, rest, free, features)
 
 
 def _supplied(nominal: ModelFile, numbers: Parameters) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
@@ -123,29 +124,16 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
     """
     projection = Projection(fit)
     spacing = setting('effort_spacing')
-    found = []
     counts = [max(4, min(int((d.end - d.start) / spacing), int(setting('most_knots'))))
               for d in evidence.drives]
     steady = np.concatenate([steady_knots(d, n) for d, n in zip(
         evidence.drives, counts, strict=True)])
     speeds = np.concatenate([_speeds(d, n) for d, n in zip(
         evidence.drives, counts, strict=True)])[steady]
-    for balance, (row, *_) in BALANCES.items():
-        columns = np.zeros((evidence.count, sum(counts)))
-        first = top = 0
-        for count, drive, whitener in zip(
-                counts, evidence.drives, evidence.whiteners, strict=True):
-            times = probe_times(drive)
-            pushed = np.zeros((times.size, 4, count))
-            pushed[:, row] = hats(times, drive.start, drive.end, count)
-            frame = whitener.frame
-            out = np.empty((frame.times.size, count))
-            respond(pushed, times, frame.times, drive.channels, frame.order, frame.cosine,
-                    frame.sine, whitener.model, setting('longest_step'), out)
-            columns[top:top + len(out), first:first + count] = whitener.apply(out)
-            first, top = first + count, top + len(out)
+
+    def at(balance: str) -> list[Missing]:
+        columns = _hat_responses(evidence, BALANCES[balance][0], counts)
         gain, _, values, deviations = beyond_chance(evidence, fit, projection, columns)
-        bursts = 0.0
         if BALANCES[balance][2] == 'none':
             normal, slope = projection.problem(columns[:, steady])
             bursts = burst_evidence(levelled(
@@ -153,13 +141,30 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
         else:
             # Their efforts burst with every command that comes a little late.
             bursts = wheel_bursts(evidence, fit, BALANCES[balance][2])
-        first = 0
-        for size, drive in zip(counts, evidence.drives, strict=True):
-            part = slice(first, first + size)
-            found.append(Missing(balance, drive, np.linspace(drive.start, drive.end, size),
-                                 values[part], deviations[part], gain, bursts))
-            first += size
-    return tuple(found)
+        ends = np.cumsum(counts)[:-1]
+        return [Missing(balance, drive, np.linspace(drive.start, drive.end, size), own, deviation,
+                        gain, bursts)
+                for size, drive, own, deviation in zip(
+                    counts, evidence.drives, np.split(values, ends), np.split(deviations, ends),
+                    strict=True)]
+    return tuple(chain.from_iterable(evidence.pool.map(at, BALANCES)))
+
+
+def _hat_responses(evidence: Evidence, row: int, counts: Sequence[int]) -> FloatArray:
+    # Whitened, one column a hat of the effort at a balance, of all drives, as many as each has.
+    columns = np.zeros((evidence.count, sum(counts)))
+    first = top = 0
+    for count, drive, whitener in zip(counts, evidence.drives, evidence.whiteners, strict=True):
+        times = probe_times(drive)
+        pushed = np.zeros((times.size, 4, count))
+        pushed[:, row] = hats(times, drive.start, drive.end, count)
+        frame = whitener.frame
+        out = np.empty((frame.times.size, count))
+        respond(pushed, times, frame.times, drive.channels, frame.order, frame.cosine,
+                frame.sine, whitener.model, setting('longest_step'), out)
+        columns[top:top + len(out), first:first + count] = whitener.apply(out)
+        first, top = first + count, top + len(out)
+    return columns
 
 
 def mismatches(evidence: Evidence, fit: Fit, subsystem: str | None) -> tuple[Mismatch, ...]:

@@ -130,7 +130,8 @@ def _parameters(case: Case) -> list[ParameterRow]:
 
 def _where(case: Case) -> tuple[Section, ...]:
     diagnosis = case.diagnosis
-    efforts = missing_efforts(case.search.evidence, case.search.plain)
+    known = case.left.evidence is case.search.evidence and case.left.final is case.search.plain
+    efforts = case.free if known else missing_efforts(case.search.evidence, case.search.plain)
     plain, final = diagnosis.plain_model.structure, diagnosis.model.structure
     elements = [e for f in diagnosis.findings for e in f.elements]
     added = new_elements(plain, final)[1]

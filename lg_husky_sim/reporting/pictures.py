@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO
 import math
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.reporting.data import MEASURED, ReportData, Trace, View
 from lg_husky_sim.reporting.sections import Chart
@@ -59,14 +59,18 @@ def png(figure: Figure, about: Mapping[str, str] | None = None) -> bytes:
     bytes
 
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
-    drawn, stream, text = BytesIO(), BytesIO(), PngInfo()
+    stream, text = BytesIO(), PngInfo()
     for key, value in (about or {}).items():
         text.add_itxt(key, value)
-    figure.savefig(drawn, format='png', dpi=DOTS)
+    figure.set_dpi(DOTS)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert('RGB')
     # Lines on white need few colours, and a third of the bytes.
-    Image.open(drawn).convert('RGB').quantize(COLOURS, dither=Image.Dither.NONE).save(
+    drawn.quantize(COLOURS, dither=Image.Dither.NONE).save(
         stream, format='png', optimize=True, pnginfo=text)
     return stream.getvalue()
 

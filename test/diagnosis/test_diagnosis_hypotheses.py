@@ -19,7 +19,7 @@ from lg_husky_sim.diagnosis.evidence.point import beginning, Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis, neutral_of
-from lg_husky_sim.diagnosis.selection.rounds import is_negligible, Tried
+from lg_husky_sim.diagnosis.selection.tried import is_negligible, Tried
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import catalogue, Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model

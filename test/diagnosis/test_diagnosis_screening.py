@@ -16,8 +16,9 @@ from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.diagnosis.selection.rounds import attempt, numbers_of
+from lg_husky_sim.diagnosis.selection.rounds import attempt
 from lg_husky_sim.diagnosis.selection.screening import look, problems_of, Projection
+from lg_husky_sim.diagnosis.selection.tried import numbers_of
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model

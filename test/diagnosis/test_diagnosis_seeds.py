@@ -18,9 +18,10 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
 from lg_husky_sim.diagnosis.selection import search as searching
 from lg_husky_sim.diagnosis.selection.conventions import best_reading
 from lg_husky_sim.diagnosis.selection.recalibration import Logged
-from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted, Tried
+from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted
 from lg_husky_sim.diagnosis.selection.screening import look
 from lg_husky_sim.diagnosis.selection.search import read_anew, Search, search, seeds_of
+from lg_husky_sim.diagnosis.selection.tried import Tried
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model

@@ -9,8 +9,8 @@ from typing import Any
 
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
 from lg_husky_sim.diagnosis.selection import rounds
-from lg_husky_sim.diagnosis.selection.rounds import Tried
 from lg_husky_sim.diagnosis.selection.ties import is_near
+from lg_husky_sim.diagnosis.selection.tried import Tried
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model
 import numpy as np

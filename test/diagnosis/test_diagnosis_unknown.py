@@ -20,9 +20,10 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import beyond_chance, Effort
 from lg_husky_sim.diagnosis.localisation import steady_knots
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.diagnosis.selection.rounds import Round, Tried
+from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.selection.search import Search
+from lg_husky_sim.diagnosis.selection.tried import Tried
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Effect
 from lg_husky_sim.husky.model_file import load_model

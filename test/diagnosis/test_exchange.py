@@ -15,7 +15,8 @@ from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
 from lg_husky_sim.diagnosis.selection.exchange import exchanged
-from lg_husky_sim.diagnosis.selection.rounds import Round, Tried
+from lg_husky_sim.diagnosis.selection.rounds import Round
+from lg_husky_sim.diagnosis.selection.tried import Tried
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording

@@ -34,6 +34,7 @@ from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import (
 )
 from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -115,9 +116,9 @@ def pushed(waves: FloatArray, place: FloatArray, heading: FloatArray) -> FloatAr
     return found
 
 
-def level(power: FloatArray, waves: FloatArray, own: int, span: float) -> float:
+def levels(power: FloatArray, waves: FloatArray, span: float) -> FloatArray:
     """
-    Return the level of the noise at a wave, by its neighbours of about its length.
+    Return the level of the noise at each wave, by its neighbours of about its length.
 
     Parameters
     ----------
@@ -125,27 +126,39 @@ def level(power: FloatArray, waves: FloatArray, own: int, span: float) -> float:
         Of each wave.
     waves : numpy.ndarray, shape (m, 2)
         Cycles per metre along x and y.
-    own : int
-        Which of them.
     span : float
         Longest way across the ground [m].
 
     Returns
     -------
-    float
+    numpy.ndarray, shape (m,)
         ``exp(mean log P + gamma)`` of waves of about its length in any direction, but for those
         next to it, with Euler's constant gamma as in :func:`.lines.level`: what leaks into some
-        of them hardly moves it.
+        of them hardly moves it. Infinite where there are none.
 
     """
-    size, gap = np.hypot(*waves.T), setting('line_gap') / span
-    apart = np.minimum(np.hypot(*(waves - waves[own]).T), np.hypot(*(waves + waves[own]).T))
-    reach = math.log(setting('wave_neighbours'))
-    near = (np.abs(np.log(size / size[own])) < reach) & (apart > gap)
-    if not np.any(near):
-        return math.inf
-    logs = np.log(np.maximum(power[near], 1e-300))
-    return math.exp(float(np.mean(logs)) + np.euler_gamma)
+    means = np.empty(power.size)
+    _mean_logs(np.log(np.maximum(power, 1e-300)), waves, np.log(np.hypot(*waves.T)),
+               math.log(setting('wave_neighbours')), setting('line_gap') / span, means)
+    found: FloatArray = np.exp(means + np.euler_gamma)
+    return found
+
+
+@jit
+def _mean_logs(logs: FloatArray, waves: FloatArray, sizes: FloatArray, reach: float, gap: float,
+               means: FloatArray) -> None:
+    for own in range(logs.size):
+        total, count = 0.0, 0
+        for other in range(logs.size):
+            if abs(sizes[other] - sizes[own]) < reach:
+                ahead = ((waves[other, 0] - waves[own, 0]) ** 2
+                         + (waves[other, 1] - waves[own, 1]) ** 2)
+                behind = ((waves[other, 0] + waves[own, 0]) ** 2
+                          + (waves[other, 1] + waves[own, 1]) ** 2)
+                if min(ahead, behind) > gap * gap:
+                    total += logs[other]
+                    count += 1
+        means[own] = total / count if count else np.inf
 
 
 def waves(evidence: Evidence, fit: Fit) -> tuple[Wave, ...]:
@@ -187,8 +200,7 @@ def waves(evidence: Evidence, fit: Fit) -> tuple[Wave, ...]:
     power = np.concatenate(list(evidence.pool.map(
         power_of, np.array_split(tried, max(1, len(tried) // int(setting('waves_at_once')))))))
     independent = math.log(max(len(tried) / DENSITY ** 2, 1.0))
-    ratios = np.array([own / level(power, tried, number, span)
-                       for number, own in enumerate(power)])
+    ratios = power / levels(power, tried, span)
 
     def at(number: int) -> Wave:
         some = tried[number:number + 1]

@@ -18,12 +18,8 @@ from lg_husky_sim.diagnosis.evidence.dispersion import accident
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, Numbers, with_effects
-from lg_husky_sim.diagnosis.selection.rounds import (
-    attempt,
-    is_negligible,
-    numbers_of,
-    Round,
-)
+from lg_husky_sim.diagnosis.selection.rounds import attempt, Round
+from lg_husky_sim.diagnosis.selection.tried import is_negligible, numbers_of
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 

@@ -16,9 +16,10 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
 from lg_husky_sim.diagnosis.selection.conventions import best_reading, read_like
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.selection.rotors import other_rotors
-from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted, Tried
+from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.selection.ticks import likelier_ticks, ticked
+from lg_husky_sim.diagnosis.selection.tried import Tried
 from lg_husky_sim.diagnosis.settings import setting
 
 

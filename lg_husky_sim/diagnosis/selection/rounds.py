@@ -9,52 +9,27 @@ comparable only under one whitener.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 import itertools
 import math
 
-from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance
-from lg_husky_sim.diagnosis.evidence.dispersion import accident, dispersion
+from lg_husky_sim.diagnosis.decision.adoption import is_beyond_chance
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, neutral_of, Numbers
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, Numbers
 from lg_husky_sim.diagnosis.selection.laws import Laws
 from lg_husky_sim.diagnosis.selection.narrowing import narrowed
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted
 from lg_husky_sim.diagnosis.selection.onsets import onset_looks, refined
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.selection.ties import is_near
+from lg_husky_sim.diagnosis.selection.tried import numbers_of, Ranking, Tried
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
-from lg_husky_sim.husky.effects import Effect, EffectParameter
+from lg_husky_sim.husky.effects import Effect
 import numpy as np
-
-
-@dataclass(frozen=True, eq=False)
-class Tried:
-    """
-    A hypothesis that was fitted.
-
-    Parameters
-    ----------
-    hypothesis : Hypothesis
-    fit : Fit
-    gain : float
-        What it lowers the cost of the base by, under one noise [nats].
-
-    """
-
-    hypothesis: Hypothesis
-    fit: Fit
-    gain: float
-    count: int
-
-    @property
-    def score(self) -> float:
-        """Gain less half the logarithm of the number of readings for each number it costs."""
-        return self.gain - 0.5 * self.hypothesis.size * math.log(self.count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,12 +190,16 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     seen = _looks(evidence, base, pool, None if nominal is not None else ())
     few = int(setting('fitted'))
     tried = fitted(evidence, base, seen[:few], [base.point], whole=False)
-    tried = sorted([*tried, *seeds], key=lambda t: -t.score)
-    starts = sum(len(h.trials()) for h in pool)
-    chance = _chance(evidence, tried[0], starts) if tried else 1.0
+    ranking = Ranking(evidence, base, laws, sum(len(h.trials()) for h in pool))
+    tried = ranking.ordered([*tried, *seeds])
+    chance = ranking.chance(tried[0]) if tried else 1.0
     if chance > setting('hopeless'):
         return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     own = evidence.renoised(tried[0].fit)
+    if not is_distorted(base):
+        chance = _chance_anew(replace(ranking, evidence=own), tried[0])
+        if chance > setting('hopeless_anew'):
+            return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     for number in range(2):
         best = tried[0]
         evidence = own if number == 0 else evidence.renoised(best.fit)
@@ -235,16 +214,20 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         tried = fitted(evidence, base, chosen, [base.point, guide], seen)
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
-    tried = [_best_form(evidence, base, t) for t in tried[:2]] + tried[2:]
-    lost = dict(zip(tried, _lost(evidence, base, tried, laws), strict=True))
-    tried.sort(key=lambda t: (is_negligible(t, evidence.noise.values),
-                              lost[t] - t.score))
+    ranking = replace(ranking, evidence=evidence, base=base)
+    tried = ranking.ordered([*(_best_form(evidence, base, t) for t in tried[:2]), *tried[2:]])
     tried = _from_the_start(evidence, base, tried)
-    best = tried[0]
-    once = lost[best] if best in lost else _lost(evidence, base, [best], laws)[0]
-    chance = 1.0 if is_negligible(best, evidence.noise.values) else _chance(
-        evidence, best, starts, once)
+    chance = ranking.chance(tried[0])
     return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
+
+
+def _chance_anew(ranking: Ranking, best: Tried) -> float:
+    # Of what it gains under its own noise, in which no rival is looked at.
+    evidence = ranking.evidence
+    base, fit = (evidence.fit(with_jitter(one.point, evidence), one.slopes)
+                 for one in (ranking.base, best.fit))
+    return replace(ranking, base=base).chance(
+        Tried(best.hypothesis, fit, base.cost - fit.cost, best.count))
 
 
 def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:
@@ -270,36 +253,6 @@ def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[T
     return [again, *(t for t in tried[1:] if t.hypothesis.effect != again.hypothesis.effect)]
 
 
-def _lost(evidence: Evidence, base: Fit, tried: Sequence[Tried], laws: Laws | None
-          ) -> list[float]:
-    # What of its gain each has by an accident, or by what the laws of others are off by.
-    gains = [t.gain for t in tried]
-    left = gains if laws is None else laws.gains_left(
-        evidence, base, [t.fit for t in tried], gains)
-    return [accident(evidence, base.whitened, t.fit.whitened) + t.gain - own
-            for t, own in zip(tried, left, strict=True)]
-
-
-def _chance(evidence: Evidence, tried: Tried, starts: int, once: float = 0.0) -> float:
-    # Of what it gains beside an accident.
-    own = tried.fit.jacobian[:, -len(tried.hypothesis.free):]
-    return chance_of(tried.gain - once, tried.hypothesis, starts, evidence,
-                     dispersion(evidence, tried.fit.whitened, own))
-
-
-def is_negligible(tried: Tried, jitter: Mapping[str, float]) -> bool:
-    """Return whether every number of a fitted effect is too small, or too large, to count."""
-    values, shape = tried.fit.point.values, tried.hypothesis.effect.shape
-
-    def least(parameter: EffectParameter) -> float:
-        of = parameter.jitter.get(shape)
-        return max(parameter.negligible, setting('late_by_jitter') * jitter[of] if of
-                   else 0.0)
-    return all(values[p.name] >= p.none_from
-               or abs(values[p.name] - (neutral_of(p) or 0.0)) < least(p)
-               for p in tried.hypothesis.free)
-
-
 def _looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
            promising: Sequence[Effect] | None) -> list[Look]:
     # With an onset: every effect, or those that promise most with and without one. Of the forms
@@ -319,12 +272,6 @@ def _looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     for one in seen:
         best.setdefault((one.hypothesis.family, one.hypothesis.onset is None), one)
     return list(best.values())
-
-
-def numbers_of(tried: Tried) -> Numbers:
-    """Return the numbers of a fitted effect by name."""
-    values = tried.fit.point.values
-    return {p.name: values[p.name] for p in tried.hypothesis.free}
 
 
 def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequence[Point],

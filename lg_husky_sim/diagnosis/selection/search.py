@@ -35,14 +35,8 @@ from lg_husky_sim.diagnosis.selection.recalibration import (
     recalibrated,
 )
 from lg_husky_sim.diagnosis.selection.rotors import other_rotors, with_any_rotors
-from lg_husky_sim.diagnosis.selection.rounds import (
-    calibrated,
-    forward_step,
-    numbers_of,
-    Round,
-    Tried,
-    with_jitter,
-)
+from lg_husky_sim.diagnosis.selection.rounds import calibrated, forward_step, Round, with_jitter
+from lg_husky_sim.diagnosis.selection.tried import numbers_of, Tried
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.signals import FloatArray
