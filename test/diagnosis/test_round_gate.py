@@ -63,7 +63,7 @@ def _step(monkeypatch: pytest.MonkeyPatch, chance: float, under_its_own: float, 
     monkeypatch.setattr(rounds, 'with_jitter', lambda point, _: point)
     monkeypatch.setattr(rounds, 'is_distorted', lambda _: distorted)
     monkeypatch.setattr(rounds, 'Ranking', lambda *known: _Ranking(
-        *known, (chance, under_its_own)))
+        *known, chances=(chance, under_its_own)))
     return rounds.forward_step(noise, fit, [], None)
 
 
