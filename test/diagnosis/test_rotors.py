@@ -5,17 +5,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.diagnose import diagnose
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
-from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.point import beginning, Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.diagnosis.selection.recalibration import as_logged
+from lg_husky_sim.diagnosis.selection import recalibration
+from lg_husky_sim.diagnosis.selection.recalibration import (
+    as_logged,
+    at_ticks,
+    Logged,
+    Recalibrated,
+)
 from lg_husky_sim.diagnosis.selection.rotors import (
     other_rotors,
     rotor_notes,
@@ -102,6 +109,23 @@ def test_a_slow_robot_is_not_taken_for_slow_sensors(pool: Threads) -> None:
     logged = as_logged(evidence, rough, afresh=True)
     assert logged.fit.point.reading == Reading()
     assert logged.fit.point.values['wheel_inertia'] > 3.5 * rough.point.parameters['wheel_inertia']
+
+
+def test_ticks_of_the_base_are_looked_for_with_the_rotors_that_were_found(
+        pool: Threads, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the nominal inertia would be held against them."""
+    evidence, rough = begun(2.0, pool)
+    base = replace(rough, point=with_any_rotors(rough.point))
+    begins: list[Point] = []
+
+    def none_likelier(first: object, plain: object, starts: list[Point], rivals: object) -> None:
+        begins.extend(starts)
+    monkeypatch.setattr(recalibration, 'likelier_ticks', none_likelier)
+    known = Recalibrated(evidence, rough, Logged(rough), evidence, base)
+    assert at_ticks(known, rough.point, []) is None
+    spread = {u.name: u.deviation for u in base.point.unknowns}
+    assert spread['wheel_inertia'] == 1.0
+    assert [{u.name: u.deviation for u in one.unknowns} for one in begins] == [spread]
 
 
 def test_a_robot_of_twice_the_inertia_lacks_nothing() -> None:

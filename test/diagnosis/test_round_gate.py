@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -62,8 +63,7 @@ def _step(monkeypatch: pytest.MonkeyPatch, chance: float, under_its_own: float, 
     monkeypatch.setattr(rounds, 'fitted', lambda *_, **__: [tried])
     monkeypatch.setattr(rounds, 'with_jitter', lambda point, _: point)
     monkeypatch.setattr(rounds, 'is_distorted', lambda _: distorted)
-    monkeypatch.setattr(rounds, 'Ranking', lambda *known: _Ranking(
-        *known, chances=(chance, under_its_own)))
+    monkeypatch.setattr(rounds, 'Ranking', partial(_Ranking, chances=(chance, under_its_own)))
     return rounds.forward_step(noise, fit, [], None)
 
 

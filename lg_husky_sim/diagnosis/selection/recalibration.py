@@ -15,7 +15,7 @@ from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
 from lg_husky_sim.diagnosis.selection.conventions import best_reading, read_like
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
-from lg_husky_sim.diagnosis.selection.rotors import other_rotors
+from lg_husky_sim.diagnosis.selection.rotors import other_rotors, with_rotors_of
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted
 from lg_husky_sim.diagnosis.selection.screening import Look, look
 from lg_husky_sim.diagnosis.selection.ticks import likelier_ticks, ticked
@@ -127,7 +127,8 @@ def at_ticks(known: Recalibrated, start: Point, rivals: Sequence[Sequence[Drive]
     known : Recalibrated
         With commands that are applied as they come.
     start : Point
-        The nominal model, with the effects that were found.
+        The nominal model, with the effects that were found. Where its wheels turned out to have
+        any inertia, they have here.
     rivals : sequence of sequence of Drive
         With commands at ticks of one rate or another.
 
@@ -138,6 +139,7 @@ def at_ticks(known: Recalibrated, start: Point, rivals: Sequence[Sequence[Drive]
         lacks something else then, which the ticks may be a part of.
 
     """
+    start = with_rotors_of(start, known.base.point)
     # From where delays have not taken their place, of a log that was made as most are or like that
     # without ticks: a low pass is not to be held against them.
     starts = [start, read_like(start, known.base.point)]

@@ -28,6 +28,14 @@ def with_any_rotors(point: Point) -> Point:
         for u in point.unknowns))
 
 
+def with_rotors_of(point: Point, other: Point) -> Point:
+    """Return a point whose wheel inertia is known as well as that of another one."""
+    known = {u.deviation for u in other.unknowns if u.name == 'wheel_inertia'}
+    return replace(point, unknowns=tuple(
+        replace(u, deviation=max(known, default=u.deviation)) if u.name == 'wheel_inertia' else u
+        for u in point.unknowns))
+
+
 def other_rotors(evidence: Evidence, base: Fit) -> Fit | None:
     """
     Return a model with a larger wheel inertia where that is likelier than chance has it.

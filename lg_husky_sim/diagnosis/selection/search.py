@@ -34,7 +34,7 @@ from lg_husky_sim.diagnosis.selection.recalibration import (
     promising,
     recalibrated,
 )
-from lg_husky_sim.diagnosis.selection.rotors import other_rotors, with_any_rotors
+from lg_husky_sim.diagnosis.selection.rotors import other_rotors
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, forward_step, Round, with_jitter
 from lg_husky_sim.diagnosis.selection.tried import numbers_of, Tried
 from lg_husky_sim.diagnosis.settings import setting
@@ -296,7 +296,7 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
                 not adopted or best is None or best.score <= one.base.cost - other_base.cost
                 - 0.5 * math.log(evidence.count)):
             # No effect, but a robot that the nominal numbers leave something out of: look again.
-            initial, otherwise, postponed = with_any_rotors(initial), None, False
+            otherwise, postponed = None, False
             evidence, base = calibrated(evidence, other_base.point, 1)
             evidence, base = _read_as(evidence, base, best_reading(evidence, base, afresh=True))
             known = replace(known, evidence=evidence, base=base)
