@@ -206,8 +206,8 @@ def _diagnosis(found: Search, left: Search, rest: Sequence[Effort], free: Sequen
         model_of(found.final, found.evidence, nominal, f'{about} {nearest}'.rstrip()),
         model_of(found.plain, found.evidence, nominal, 'recalibrated, nothing added'),
         (*((nearest,) if nearest else ()), *_notes(found, plain_out, augmented_out)),
-        asdict(said.features), strained_plain=strained(found.plain),
-        strained=strained(found.final))
+        {**asdict(said.features), 'readings': float(found.evidence.count)},
+        strained_plain=strained(found.plain), strained=strained(found.final))
     return diagnosis, said.features
 
 
@@ -249,6 +249,10 @@ def _refused(last: Round, found: Sequence[Hypothesis]) -> str:
     name = best.hypothesis.effect.id
     again = 'one more ' if name in {one.effect.id for one in found} else ''
     gain = f'the best further effect, {again}{name}, gains {best.gain:.1f} nats, '
+    if last.small:
+        told = 200.0 * best.gain / best.count
+        return gain + (f'{told:.2g} % of the variance of the innovations: beyond chance, but so '
+                       'little is left by models that are not exact more often than by an effect')
     if last.chance > setting('false_alarm_rate'):
         beside = ', or what was found may be off by' if found else ''
         return gain + ('as chance alone gives it' if last.chance > 0.5 else

@@ -96,9 +96,12 @@ def remaining(search: Search) -> Search:
     -------
     Search
         With disturbances that may last as long as a robot stays at a place, where those of the
-        search last as long as they may: what a floor does for seconds is no unknown effort.
+        search last as long as they may: what a floor does for seconds is no unknown effort. What
+        has a name and is too little to be likely real is no unknown effort either.
 
     """
+    if search.beside is not None:
+        search = replace(search, final=search.beside)
     longest = setting('longest_time')
     times = [value for name, value in search.evidence.noise.values.items()
              if name.endswith('_time')]

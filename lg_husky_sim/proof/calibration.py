@@ -7,6 +7,10 @@ For each kind of answer the share right is a logistic function of what informs a
 ``p = 1 / (1 + exp(-(c0 + c1 x1 + ...)))``. The coefficients maximise the likelihood of the
 outcomes with independent Gaussian priors around zero, and around a stated share right for c0, so
 that few outcomes do not make certainty.
+
+Whether a name that is beyond chance is real has coefficients as well. What decides them are right
+names, those that stand beside a right one, and those of robots that lack nothing: of a name that
+stands in another's place nothing is learned about its size.
 """
 
 from __future__ import annotations
@@ -33,6 +37,7 @@ COEFFICIENTS = {
     'unknown': ('unknown_constant', 'unknown_share_slope'),
     'changed': ('change_constant', 'change_chance'),
     'unchanged': ('unchanged_constant', 'unchanged_chance'),
+    'real': ('real_constant', 'real_told'),
 }
 
 
@@ -59,6 +64,19 @@ def _weakest(line: Json) -> Json:
     if 'margin' not in features or not line['said']:
         return features
     return {**features, 'gain': min(float(one['gain']) for one in line['said'])}
+
+
+def _names(line: Json) -> list[tuple[list[float], bool]]:
+    """Return what multiplies the coefficients of whether a name is real, and whether it is."""
+    if line['kind'] not in ('none', 'single', 'pair'):
+        return []
+    true = {one['effect'] for one in line['true']}
+    said = [one for one in line['said'] if one['effect'] != 'unknown' and one['gain'] is not None]
+    if true and not any(one['effect'] in true for one in said):
+        return []
+    count = line['features'].get('readings', settings()['calibration']['readings']['value'])
+    return [([1.0, math.log10(2.0 * max(float(one['gain']), 1.0) / count)], one['effect'] in true)
+            for one in said]
 
 
 def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
@@ -94,6 +112,9 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
                                    f'numbers share, chance and gain: {error}') from error
             rows[answer].append(row)
             right[answer].append(mark)
+            for row, real in _names(line):
+                rows['real'].append(row)
+                right['real'].append(float(real))
     if not any(right.values()):
         raise LgHuskyError('no outcome has the features of its confidence: they are of an '
                            'earlier version')

@@ -65,7 +65,10 @@ def test_the_weakest_name_counts_where_the_first_was_written_down() -> None:
     weak = [{**row, 'features': {**row['features'], 'gain': 1e6, 'margin': 0.5},
              'said': [{**row['said'][0], 'gain': gain}
                       for gain in (1e6, row['features']['gain'])]} for row in rows]
-    assert calibrated(weak) == calibrated(rows)
+    answers = [name for names in calibration.COEFFICIENTS.values() for name in names
+               if not name.startswith('real_')]
+    found, expected = calibrated(weak), calibrated(rows)
+    assert [found[name] for name in answers] == [expected[name] for name in answers]
 
 
 def test_changes_have_coefficients_of_their_own() -> None:
@@ -82,6 +85,31 @@ def test_changes_have_coefficients_of_their_own() -> None:
     same = {**line('same', True, gain=0.0, chance=0.5), 'kind': 'before_after',
             'verdict': 'nothing_missing', 'said': [], 'true': [], 'level': 'clean'}
     assert calibrated([same])['unchanged_constant'][1:] == (1, 1)
+
+
+def test_names_beside_a_right_one_and_of_clean_robots_tell_how_large_real_ones_are() -> None:
+    """Those in the place of another name do not: they say nothing of its size."""
+    rng = np.random.default_rng(7)
+    features = {'share': 0.1, 'chance': 1e-9, 'gain': 1.0, 'readings': 20000}
+
+    def outcome(i: int, decades: float) -> dict[str, Any]:
+        right = bool(rng.uniform() < 1.0 / (1.0 + np.exp(-3.0 * (2.0 + decades))))
+        whole = line(f'c{i}', True, **features)
+        first, gain = whole['said'][0], 0.5 * 20000 * 10.0 ** decades
+        if right:
+            return {**whole, 'said': [{**first, 'gain': gain}]}
+        return {**whole, 'kind': 'none', 'level': 'clean', 'true': [],
+                'said': [{**first, 'gain': gain}]}
+    rows = [outcome(i, d) for i, d in enumerate(rng.uniform(-4.0, 0.0, 500))]
+    constant, told = (calibrated(rows)[name] for name in ('real_constant', 'real_told'))
+    assert -constant[0] / told[0] == pytest.approx(-2.0, abs=0.2)
+    assert told[0] > 2.0
+    assert constant[1] == 500
+    wrong = [line(f'w{i}', False, **features) for i in range(50)]
+    assert calibrated([*rows, *wrong])['real_told'] == told
+    extra = line('two', True, **features)
+    extra = {**extra, 'said': [*extra['said'], {**extra['said'][0], 'effect': 'payload'}]}
+    assert calibrated([*rows, extra])['real_told'][1:] == (502, told[2] + 1)
 
 
 def test_few_outcomes_do_not_make_certainty() -> None:

@@ -9,6 +9,13 @@ with a probability of at most n times that of one.
 
 Innovations that are not quite white make a gain larger by chance, by their dispersion.
 
+No model is exact, and what a robot differs from it by grows with the number of readings as real
+effects do: much of what is beyond chance is too little to be an effect. With the share
+``v = 2 gain / n`` of the variance of the n innovations that an effect explains, how likely it is
+real is ``p = 1 / (1 + exp(-(c0 + c1 log10 v)))``, by what became of the names of exams. An effect
+is adopted where it is beyond chance and more likely real than not (Bayes' rule where either error
+costs as much).
+
 The log evidence of an effort without a name is the logarithm of a Bayes factor B. Where nothing is
 missing, its mean is one, so that ``P(B >= b) <= 1 / b`` (Markov), and with n of them that are
 looked at, the largest exceeds ``n / rate`` with a probability of at most that rate.
@@ -21,7 +28,7 @@ import math
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.settings import setting
-from scipy.special import chdtrc
+from scipy.special import chdtrc, expit
 
 
 def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidence,
@@ -59,6 +66,27 @@ def chance_of(gain: float, hypothesis: Hypothesis, tried: int, evidence: Evidenc
 def is_beyond_chance(chance: float) -> bool:
     """Return whether a gain is beyond the stated false-alarm rate."""
     return chance < setting('false_alarm_rate')
+
+
+def likely_real(gain: float, count: int) -> float:
+    """
+    Return how likely an effect of the catalogue is real if its gain is beyond chance.
+
+    Parameters
+    ----------
+    gain : float
+        [nats]
+    count : int
+        Number of readings.
+
+    """
+    told = 2.0 * max(gain, setting('least_told_gain')) / count
+    return float(expit(setting('real_constant') + setting('real_told') * math.log10(told)))
+
+
+def is_rather_real(gain: float, count: int) -> bool:
+    """Return whether an effect is real more likely than not, see :func:`likely_real`."""
+    return likely_real(gain, count) > 0.5
 
 
 def evidence_beyond_chance(looks: int) -> float:

@@ -14,7 +14,11 @@ from dataclasses import dataclass, field, replace
 import itertools
 import math
 
-from lg_husky_sim.diagnosis.decision.adoption import is_beyond_chance
+from lg_husky_sim.diagnosis.decision.adoption import (
+    is_beyond_chance,
+    is_rather_real,
+    likely_real,
+)
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened
@@ -48,6 +52,9 @@ class Round:
     adopted : bool
     chance : float
         Probability of such a gain on a robot that lacks nothing.
+    looks : tuple of Look
+    small : bool
+        Whether the best is beyond chance, but too little to be likely real.
 
     """
 
@@ -57,6 +64,7 @@ class Round:
     adopted: bool
     chance: float
     looks: tuple[Look, ...] = field(default=())
+    small: bool = False
 
 
 def calibrated(evidence: Evidence, start: Point, times: int = 2) -> tuple[Evidence, Fit]:
@@ -218,7 +226,10 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     tried = ranking.ordered([*(_best_form(evidence, base, t) for t in tried[:2]), *tried[2:]])
     tried = _from_the_start(evidence, base, tried)
     chance = ranking.chance(tried[0])
-    return Round(evidence, base, tuple(tried), is_beyond_chance(chance), chance, tuple(seen))
+    real = likely_real(tried[0].gain, evidence.count)
+    small = is_beyond_chance(chance) and not is_rather_real(tried[0].gain, evidence.count)
+    return Round(evidence, base, tuple(tried), is_beyond_chance(chance) and not small,
+                 max(chance, 1.0 - real) if small else chance, tuple(seen), small)
 
 
 def _chance_anew(ranking: Ranking, best: Tried) -> float:

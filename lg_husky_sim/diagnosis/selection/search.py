@@ -60,6 +60,8 @@ class Search:
     rounds : tuple of Round
     found : tuple of Hypothesis
         Adopted, in the order of adoption.
+    beside : Fit or None
+        Where nothing is adopted: with what is beyond chance and too little to be likely real.
 
     """
 
@@ -68,6 +70,7 @@ class Search:
     evidence: Evidence
     rounds: tuple[Round, ...]
     found: tuple[Hypothesis, ...]
+    beside: Fit | None = None
 
     @property
     def adopted(self) -> tuple[Round, ...]:
@@ -340,4 +343,6 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         rounds = _without_the_dropped(rounds, found, kept)
         found = kept
         plain = plain if found else base
-    return Search(plain, base, evidence, tuple(rounds), tuple(found))
+    last = rounds[-1]
+    beside = last.tried[0].fit if last.small and not found else None
+    return Search(plain, base, evidence, tuple(rounds), tuple(found), beside)

@@ -1,0 +1,79 @@
+# Copyright 2026 lg_husky_sim contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is beyond chance, and too little to be an effect more likely than not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lg_husky_sim.comparison.output import simulate_commands
+from lg_husky_sim.diagnosis.decision.adoption import is_rather_real, likely_real
+from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.model_file import load_model
+from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.manoeuvres import Manoeuvre, Step
+from lg_husky_sim.proof import calibration
+from lg_husky_sim.recording import Recording
+from lg_husky_sim.signals import TimeSeries
+import numpy as np
+import pytest
+
+NOISE = {'wheels': 0.0156, 'imu': 0.0039, 'pose': 0.0026}
+
+
+def rolling(robot: Callable[..., Plant], force: float) -> Recording:
+    """Return a drive of half a minute with a rolling resistance [N]."""
+    random = np.random.default_rng(0)
+    plant = robot('rolling_resistance', rolling_force=force)
+    steps = [Step(float(random.uniform(0.4, 2.0)), float(random.uniform(-0.8, 0.8)),
+                  float(random.uniform(-0.8, 0.8)), 0.2) for _ in range(16)]
+    still = Step(1.0, 0.0, 0.0, 0.2)
+    seen = simulate_commands(plant, Manoeuvre('random', (still, *steps, still)).commands(), 1.0)
+    noisy = {name: TimeSeries(seen[name].times, seen[name].values + deviation
+                              * random.standard_normal(seen[name].values.shape), seen[name].names)
+             for name, deviation in NOISE.items()}
+    return Recording('rec', 'rec', {'command': seen['command'], **noisy}, 0,
+                     frames=('odom', 'base_link'))
+
+
+def test_the_share_of_the_variance_counts() -> None:
+    """What a model is off by gains the more the longer a recording is, as effects do."""
+    assert likely_real(50.0, 10000) == pytest.approx(likely_real(500.0, 100000))
+    assert likely_real(50.0, 10000) < likely_real(60.0, 10000)
+    assert not is_rather_real(40.0, 31000)
+    assert is_rather_real(400.0, 31000)
+    assert 0.0 < likely_real(0.0, 31000) < 0.01
+
+
+def test_what_is_fitted_to_names_is_what_decides() -> None:
+    """The trial shares no code with the diagnosis: the formula stands in both."""
+    line = {'kind': 'none', 'true': [], 'features': {'readings': 20000},
+            'said': [{'effect': 'payload', 'gain': 90.0}]}
+    (row, real), = calibration._names(line)
+    odds = np.log(likely_real(90.0, 20000) / (1.0 - likely_real(90.0, 20000)))
+    known = calibration.COEFFICIENTS['real']
+    assert known == ('real_constant', 'real_told')
+    assert not real
+    assert odds == pytest.approx(float(np.dot(row, [setting(name) for name in known])))
+
+
+@pytest.mark.parametrize(('force', 'named'), [(0.6, False), (3.0, True)])
+def test_an_effect_that_is_too_little_is_said_but_not_named(
+        robot: Callable[..., Plant], force: float, named: bool) -> None:
+    """Nor is it unknown: it has a name."""
+    case = diagnose([rolling(robot, force)], load_model(), lambda text, share: None)
+    said, last = case.diagnosis, case.search.rounds[-1]
+    assert last.small is not named
+    if named:
+        assert [f.effect for f in said.findings] == ['rolling_resistance']
+        assert case.search.beside is None
+        return
+    assert said.verdict is Verdict.NOTHING_MISSING
+    assert 0.5 < last.chance < 1.0
+    assert 'rolling_resistance, gains' in said.remaining
+    assert 'of the variance of the innovations: beyond chance, but' in said.remaining
+    assert case.search.beside is not None
+    assert case.left.final.point.structure.effects
+    assert not case.search.final.point.structure.effects
