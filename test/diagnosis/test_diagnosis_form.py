@@ -60,7 +60,7 @@ def test_another_harmonic_is_a_ripple_and_what_is_mainly_another_law_is_unknown(
         ripple = Effect('torque_ripple', 'right', 'once')
         structure = structure.with_effect(ripple)
         parameters = parameters.with_entries(*entries_of(ripple, {
-            'ripple_cos': 0.18, 'ripple_sin': 0.07}))
+            'ripple_cos': 0.4, 'ripple_sin': 0.15}))
     drives = drives_of([record('ahead', compile_model(structure).at(parameters), steps, 6)])
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
