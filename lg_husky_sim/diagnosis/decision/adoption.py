@@ -79,6 +79,11 @@ def likely_real(gain: float, count: int) -> float:
     count : int
         Number of readings.
 
+    Returns
+    -------
+    float
+        Between 0 and 1, by the names of exams.
+
     """
     told = 2.0 * max(gain, setting('least_told_gain')) / count
     return float(expit(setting('real_constant') + setting('real_told') * math.log10(told)))
