@@ -251,8 +251,9 @@ def _refused(last: Round, found: Sequence[Hypothesis]) -> str:
     gain = f'the best further effect, {again}{name}, gains {best.gain:.1f} nats, '
     if last.small:
         told = 200.0 * best.gain / best.count
-        return gain + (f'{told:.2g} % of the variance of the innovations: beyond chance, but so '
-                       'little is left by models that are not exact more often than by an effect')
+        return gain + (f'and explains {told:.2g} % of the variance of the innovations: beyond '
+                       'chance, but so little is left by models that are not exact more often '
+                       'than by an effect')
     if last.chance > setting('false_alarm_rate'):
         beside = ', or what was found may be off by' if found else ''
         return gain + ('as chance alone gives it' if last.chance > 0.5 else

@@ -73,7 +73,7 @@ def test_an_effect_that_is_too_little_is_said_but_not_named(
     assert said.verdict is Verdict.NOTHING_MISSING
     assert 0.5 < last.chance < 1.0
     assert 'rolling_resistance, gains' in said.remaining
-    assert 'of the variance of the innovations: beyond chance, but' in said.remaining
+    assert '% of the variance of the innovations: beyond chance, but so little' in said.remaining
     assert case.search.beside is not None
     assert case.left.final.point.structure.effects
     assert not case.search.final.point.structure.effects
