@@ -30,3 +30,11 @@ def test_tasks_run_beside_each_other() -> None:
         names = list(pool.map(lambda _: set(pool.map(
             lambda _: threading.current_thread().name, range(5))), range(2)))
     assert all(len(one) == 1 for one in names)
+
+
+def test_tasks_that_come_after_the_end_run_where_they_are_asked_for() -> None:
+    """A report is made of what was found when the threads are gone."""
+    with Threads(2) as pool:
+        pass
+    names = set(pool.map(lambda _: threading.current_thread().name, range(3)))
+    assert names == {threading.current_thread().name}

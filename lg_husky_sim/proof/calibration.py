@@ -106,14 +106,14 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
         answer = _answer(line)
         if line.get('features') and answer in rows and mark is not None:
             try:
-                row = _row(answer, _weakest(line))
-            except (KeyError, TypeError, ValueError) as error:
+                row, said = _row(answer, _weakest(line)), _names(line)
+            except (KeyError, TypeError, ValueError, ZeroDivisionError) as error:
                 raise LgHuskyError(f'case {line["case"]}: the features of its confidence need the '
                                    f'numbers share, chance and gain: {error}') from error
             rows[answer].append(row)
             right[answer].append(mark)
-            for row, real in _names(line):
-                rows['real'].append(row)
+            for told, real in said:
+                rows['real'].append(told)
                 right['real'].append(float(real))
     if not any(right.values()):
         raise LgHuskyError('no outcome has the features of its confidence: they are of an '

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.decision.adoption import is_rather_real, likely_real
@@ -77,3 +77,12 @@ def test_an_effect_that_is_too_little_is_said_but_not_named(
     assert case.search.beside is not None
     assert case.left.final.point.structure.effects
     assert not case.search.final.point.structure.effects
+
+
+def test_an_effect_that_the_robot_s_numbers_took_the_place_of_is_named(
+        robot: Callable[..., Plant], record: Callable[..., Recording],
+        steps: Sequence[tuple[float, float, float]]) -> None:
+    """Roughly fitted it gains less than 10 nats, which is likely by chance; in the end 84."""
+    rolling = record('rec', robot('rolling_resistance', rolling_force=1.0), steps, 0)
+    said = diagnose([rolling], load_model(), lambda text, share: None).diagnosis
+    assert [f.effect for f in said.findings] == ['rolling_resistance']

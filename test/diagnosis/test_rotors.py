@@ -28,6 +28,7 @@ from lg_husky_sim.diagnosis.selection.rotors import (
     rotor_notes,
     with_any_rotors,
 )
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
@@ -97,8 +98,9 @@ def test_the_nominal_inertia_stays_where_nothing_says_that_it_is_larger(
     assert rotor_notes(rough.point) == ()
     # Nor is it said of one that was free and ended where it was, or below.
     free = with_any_rotors(rough.point)
+    nominal = load_model().parameters['wheel_inertia']
     for share, said in ((1.0, 0), (0.6, 0), (1.6, 1)):
-        there = free.at(np.array([u.place(share * 0.08) if u.name == 'wheel_inertia' else place
+        there = free.at(np.array([u.place(share * nominal) if u.name == 'wheel_inertia' else place
                                   for u, place in zip(free.unknowns, free.places, strict=True)]))
         assert len(rotor_notes(there)) == said
 
@@ -124,7 +126,7 @@ def test_ticks_of_the_base_are_looked_for_with_the_rotors_that_were_found(
     known = Recalibrated(evidence, rough, Logged(rough), evidence, base)
     assert at_ticks(known, rough.point, []) is None
     spread = {u.name: u.deviation for u in base.point.unknowns}
-    assert spread['wheel_inertia'] == 1.0
+    assert spread['wheel_inertia'] == setting('rotor_spread')
     assert [{u.name: u.deviation for u in one.unknowns} for one in begins] == [spread]
 
 

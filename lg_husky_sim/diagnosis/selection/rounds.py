@@ -51,7 +51,8 @@ class Round:
         Best score first.
     adopted : bool
     chance : float
-        Probability of such a gain on a robot that lacks nothing.
+        Probability of such a gain on a robot that lacks nothing; of a small one, that it is not
+        real.
     looks : tuple of Look
     small : bool
         Whether the best is beyond chance, but too little to be likely real.
@@ -199,15 +200,11 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     few = int(setting('fitted'))
     tried = fitted(evidence, base, seen[:few], [base.point], whole=False)
     ranking = Ranking(evidence, base, laws, sum(len(h.trials()) for h in pool))
-    tried = ranking.ordered([*tried, *seeds])
-    chance = ranking.chance(tried[0]) if tried else 1.0
+    tried = sorted([*tried, *seeds], key=lambda t: -t.score)
+    chance = ranking.rough_chance(tried[0]) if tried else 1.0
     if chance > setting('hopeless'):
         return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     own = evidence.renoised(tried[0].fit)
-    if not is_distorted(base):
-        chance = _chance_anew(replace(ranking, evidence=own), tried[0])
-        if chance > setting('hopeless_anew'):
-            return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     for number in range(2):
         best = tried[0]
         evidence = own if number == 0 else evidence.renoised(best.fit)
@@ -225,20 +222,11 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     ranking = replace(ranking, evidence=evidence, base=base)
     tried = ranking.ordered([*(_best_form(evidence, base, t) for t in tried[:2]), *tried[2:]])
     tried = _from_the_start(evidence, base, tried)
-    chance = ranking.chance(tried[0])
-    real = likely_real(tried[0].gain, evidence.count)
-    small = is_beyond_chance(chance) and not is_rather_real(tried[0].gain, evidence.count)
-    return Round(evidence, base, tuple(tried), is_beyond_chance(chance) and not small,
-                 max(chance, 1.0 - real) if small else chance, tuple(seen), small)
-
-
-def _chance_anew(ranking: Ranking, best: Tried) -> float:
-    # Of what it gains under its own noise, in which no rival is looked at.
-    evidence = ranking.evidence
-    base, fit = (evidence.fit(with_jitter(one.point, evidence), one.slopes)
-                 for one in (ranking.base, best.fit))
-    return replace(ranking, base=base).chance(
-        Tried(best.hypothesis, fit, base.cost - fit.cost, best.count))
+    chance, real = ranking.chance(tried[0]), likely_real(tried[0].gain, evidence.count)
+    beyond = is_beyond_chance(chance)
+    small = beyond and not is_rather_real(tried[0].gain, evidence.count)
+    return Round(evidence, base, tuple(tried), beyond and not small,
+                 1.0 - real if small else chance, tuple(seen), small)
 
 
 def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:

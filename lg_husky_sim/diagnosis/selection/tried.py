@@ -91,12 +91,19 @@ class Ranking:
                                             lost[t] - t.score))
 
     def chance(self, best: Tried) -> float:
-        """Return how likely such a gain is on a robot that lacks nothing."""
+        """Return how likely what counts of such a gain is on a robot that lacks nothing."""
         if is_negligible(best, self.evidence.noise.values):
             return 1.0
+        return self._chance_of(best, best.gain - self._lost([best])[0])
+
+    def rough_chance(self, best: Tried) -> float:
+        """Return the same of all of a gain: a fit that is not finished may gain far more."""
+        return self._chance_of(best, best.gain)
+
+    def _chance_of(self, best: Tried, gain: float) -> float:
         own = best.fit.jacobian[:, -len(best.hypothesis.free):]
-        return chance_of(best.gain - self._lost([best])[0], best.hypothesis, self.starts,
-                         self.evidence, dispersion(self.evidence, best.fit.whitened, own))
+        return chance_of(gain, best.hypothesis, self.starts, self.evidence,
+                         dispersion(self.evidence, best.fit.whitened, own))
 
     def _lost(self, tried: Sequence[Tried]) -> list[float]:
         # What of its gain each has by an accident, or by what the laws of others are off by.
