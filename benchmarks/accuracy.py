@@ -22,9 +22,8 @@ from lg_husky_sim.simulation.events import trajectory
 from lg_husky_sim.testing.radau import NOISE, Reference
 import numpy as np
 
-#: Effects that the reference does not integrate: play is a memory with stops, an onset is tested
-#: as an event.
-APART = ('gear_backlash', 'terrain_change')
+#: Effects that the reference does not integrate: an onset is tested as an event.
+APART = ('terrain_change',)
 
 
 def errors(plant: Plant, seconds: float, seed: int) -> FloatArray:

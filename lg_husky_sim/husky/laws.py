@@ -6,8 +6,8 @@ The non-linear laws f(z) that a modulated source of the graph may follow.
 Each effort of a plant is one row: the number of its law, up to ``WIDTH`` coefficients, and the
 place where its arguments begin in ``z``. One interpreter evaluates all rows, so that a new set of
 efforts needs no new machine code. ``context`` holds what is not in the graph:
-[time, heading, x, y, angle_left, angle_right]. ``memory`` holds eight accumulators:
-[heat_left, heat_right, gap_left, gap_right, held_left, held_right, tyre_left, tyre_right].
+[time, heading, x, y, angle_left, angle_right]. ``memory`` holds six accumulators:
+[heat_left, heat_right, held_left, held_right, tyre_left, tyre_right].
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ CEILING = WIDTH - 1
 #: Where the row of a law in the series to a motor holds which one: 1 or 2; 0 for one that gets
 #: the commanded voltage whatever acts before it.
 MOTOR = WIDTH - 2
-#: Length of the context vector: time, heading, x, y, angle_left, angle_right, sub-step.
-CONTEXT = 7
-#: Length of the memory vector: heat of both motors, play of both gears, what static friction
-#: gives way on both axles and at the tyres of both sides.
-MEMORY = 8
-#: Where in it the play begins, and what gives way.
-GAPS, HELD = 2, 4
+#: Length of the context vector: time, heading, x, y, angle_left, angle_right.
+CONTEXT = 6
+#: Length of the memory vector: heat of both motors, what static friction gives way on both axles
+#: and at the tyres of both sides.
+MEMORY = 6
+#: Where in it what gives way begins.
+HELD = 2
 
 
 class Law(enum.IntEnum):
@@ -76,8 +76,8 @@ class Law(enum.IntEnum):
     HEATING = 13
     """f = -p0 heat z0, heat' = z0^2 - heat/p1; p2 is 0 (left) or 1 (right)."""
     BACKLASH = 14
-    """f = -p1 z2 for the part of a step in which the play p0 is being crossed, at the rate
-    z0/p1 - z1; p2 is the side."""
+    """f = sgn(t) max(|t| - p0, 0) - t, t = z0 + p1 z1: of the torque t of a spring beside a
+    damper, what has to take up a play first (p0 is the spring's torque across half of it)."""
     TABLE = 15
     """f = table over [p1, p2] with |p3| knots p4..., of context p0 >= 0 or of z0 if p0 < 0;
     straight between the knots, and periodic where p3 is negative."""
@@ -114,7 +114,7 @@ EXPRESSIONS = {
     Law.BUS_SAG: '-z1/p1*p0*(z1*z3+z2*z4)/p1',
     Law.DROOP: '-z1*((p0*time+p1)-abs(p0*time-p1))/2',
     Law.HEATING: '-p0*heat*z1+0*p1+0*p2',
-    Law.BACKLASH: '-p1*in_play*z3+0*p0+0*p2+0*z1+0*z2',
+    Law.BACKLASH: '-(abs(z1+p1*z2+p0)-abs(z1+p1*z2-p0))/2',
     Law.TABLE: 'table',
     Law.FRICTION_CIRCLE: (
         '(1/(1+(((p1*z1)**2+(p2*z2)**2)/p0**2)**1.5)**0.3333333333333333-1)*p1*z1'),
@@ -126,7 +126,7 @@ EXPRESSIONS = {
 }
 #: Laws that depend on where the robot is, and laws that advance a memory each time they are met.
 CONTEXTUAL = (Law.HEADING, Law.WHEEL_PHASE, Law.TABLE)
-REMEMBERING = (Law.HEATING, Law.BACKLASH, Law.STICTION)
+REMEMBERING = (Law.HEATING, Law.STICTION)
 #: Places of laws in the series from a command to a motor: dead band, largest duty cycle, the bus
 #: whose voltage the bridge chops, limit of the current, the winding behind the driver. By the
 #: law's number; 0 for a law that is not in the series.
@@ -136,7 +136,7 @@ PLACES = np.array([{
     Law.BUS_SAG: 3, Law.CURRENT_LIMIT: 4, Law.HEATING: WINDING}.get(law, 0) for law in Law],
     dtype=np.int64)
 #: Names in the expressions that are signals, not parameters.
-SIGNALS = ('heading', 'angle', 'time', 'heat', 'in_play', 'table', 'held')
+SIGNALS = ('heading', 'angle', 'time', 'heat', 'table', 'held')
 
 
 @jit_part
@@ -203,7 +203,7 @@ def _summed(c: int, laws: NDArray[np.int64], coefficients: FloatArray, out: Floa
 
 @jit_part
 def _source_law(c: int, j: int, laws: NDArray[np.int64], coefficients: FloatArray, z: FloatArray,
-                o: int, memory: FloatArray, time: float, step: float, out: FloatArray) -> float:
+                o: int, memory: FloatArray, time: float, out: FloatArray) -> float:
     # Laws of the electrical side: what the driver adds to the voltage that it gets.
     law, p0, p1 = laws[c, j], coefficients[c, j, 0], coefficients[c, j, 1]
     p2, ceiling = coefficients[c, j, 2], coefficients[c, j, CEILING]
@@ -232,14 +232,7 @@ def _source_law(c: int, j: int, laws: NDArray[np.int64], coefficients: FloatArra
         return float(-own / p1 * p0 * (own * z[o + 2] + other * z[o + 3]) / p1)
     if law == 12:
         return float(-own * min(p0 * max(time, 0.0), p1))
-    if law == 13:
-        return float(-p0 * memory[int(p2)] * own)
-    rate = z[o] / p1 - z[o + 1]
-    left = 0.5 * p0 - math.copysign(1.0, rate) * memory[GAPS + int(p2)]
-    if left <= 0.0:
-        return 0.0
-    return float(-p1 * z[o + 2] * (1.0 if abs(rate) * step < left else left / (
-        abs(rate) * step)))
+    return float(-p0 * memory[int(p2)] * own)
 
 
 @jit_part
@@ -262,9 +255,9 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
     z : numpy.ndarray, shape (n_arguments,)
         Arguments of all efforts, one effort after the other (SI).
     context : numpy.ndarray, shape (CONTEXT,)
-        Time, heading, x, y, both wheel angles and the sub-step.
+        Time, heading, x, y and both wheel angles.
     memory : numpy.ndarray, shape (MEMORY,)
-        Heat of the motors, play of the gears and what static friction gives way.
+        Heat of the motors and what static friction gives way.
     out : numpy.ndarray, shape (n_efforts,)
         Receives the efforts; the last in series with a motor is the sum of them.
 
@@ -308,14 +301,16 @@ def evaluate(c: int, laws: NDArray[np.int64], coefficients: FloatArray,
             held, share = memory[HELD + int(p2)], z[o + 1] / coefficients[c, j, 3]
             free = math.exp(-2.0 * share * share) - held * held / (p1 * p1)
             out[j] = -p0 / p1 * (held + coefficients[c, j, 4] * max(free, 0.0) * z[o])
+        elif law == 14:
+            torque = z[o] + p1 * z[o + 1]
+            out[j] = math.copysign(max(abs(torque) - p0, 0.0), torque) - torque
         elif law == 18:
             out[j] = math.copysign(max(abs(z[o]) - p0, 0.0), z[o]) / p1
         elif law == 15:
             selector = int(p0)
             out[j] = _table(coefficients, c, j, z[o] if selector < 0 else context[selector])
         else:
-            out[j] = _source_law(c, j, laws, coefficients, z, o, memory, context[0], context[6],
-                                 out)
+            out[j] = _source_law(c, j, laws, coefficients, z, o, memory, context[0], out)
             if coefficients[c, j, MOTOR] > 0.0:
                 in_series += 1
     if in_series > 2:  # more than one effect of both motors

@@ -14,7 +14,7 @@ from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky import network
 from lg_husky_sim.husky.command_lag import smooth_commands
 from lg_husky_sim.husky.command_lag import STATES as LAG_STATES
-from lg_husky_sim.husky.edits import branch_of, edit, EditedNetwork, stage_of
+from lg_husky_sim.husky.edits import axles, branch_of, edit, EditedNetwork, stage_of
 from lg_husky_sim.husky.effects import always_on, Effect, Onset
 from lg_husky_sim.husky.laws import MOTOR, WIDTH
 from lg_husky_sim.husky.parameters import Parameters
@@ -152,8 +152,8 @@ def _numeric(graph: LinearGraph, outputs: tuple[str, ...]) -> NumericModel:
 
 
 def _outputs(edited: EditedNetwork) -> tuple[str, ...]:
-    names = {branch.name for branch in edited.graph.branches}
-    left, right = ('J_LW', 'J_RW') if 'J_LW' in names else ('J_RL', 'J_RR')
+    left, right = (edited.counted.get(letter, axle.name)
+                   for letter, axle in axles(edited.graph, 'both'))
     return (f'omega({left})', f'omega({right})', 'v(M_H)', 'omega(J_H)', 'i(L_1)', 'i(L_2)')
 
 

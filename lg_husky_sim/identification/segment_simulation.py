@@ -67,10 +67,8 @@ def simulate_segment(simulator: Simulator, segment: FitSegment, latency: float =
             now = poses[first // stride]
             flat[state.n + 3:state.n + 6] = now.heading, now.x, now.y
         if angles is not None and first:
-            # An encoder turns with its motor, a play ahead of the wheel.
-            wheel = angles[first // stride] - flat[state.n + 9:state.n + 11]
-            ahead += flat[state.n:state.n + 2] - wheel
-            flat[state.n:state.n + 2] = wheel
+            ahead += flat[state.n:state.n + 2] - angles[first // stride]
+            flat[state.n:state.n + 2] = angles[first // stride]
         given = max(int(np.searchsorted(events.stamps, flat[state.n + 6] - longest)) - 1, 0)
         run(flat, events.stamps[given:], events.values[given:], events.times[first:last],
             events.places[:last - first], out[first + 1:last + 1], events.times[last - 1],

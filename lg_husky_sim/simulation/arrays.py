@@ -86,9 +86,9 @@ YAW_ACCELERATION, ACCELERATION, ROWS = 9, 10, 11
 #: and inside it; voltages, their slopes, those inside a step; command in force, behind limits
 #: and ramps, slopes of the ramps, times at which they end, and where; direction (cosine, sine);
 #: integrals of wheel rates, speed and yaw rate over a part of a step; speed, yaw rate and their
-#: derivatives at the last point; play of both gears and its rates.
+#: derivatives at the last point.
 (CONTEXT, MEMORY, KEPT, NOW, U, DU, U_INSIDE, COMMANDED, LIMITED, SLOPES, RAMPS, AIMS, TANGENT,
- PART, LAST, PLAY, FEW_ROWS) = 0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17
+ PART, LAST, FEW_ROWS) = 0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16
 #: Their length.
 FEW = 8
 

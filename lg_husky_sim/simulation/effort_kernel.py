@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from lg_husky_sim.husky.laws import evaluate, GAPS, HELD
+from lg_husky_sim.husky.laws import evaluate, HELD
 from lg_husky_sim.husky.laws import MEMORY as MEMORIES
 from lg_husky_sim.jit import jit_part
 from lg_husky_sim.signals import FloatArray
@@ -112,20 +112,13 @@ def memories(plant: Packed, c: int, z: FloatArray, node: int, step: float, few: 
         few[NOW, i] = few[MEMORY, i]
     for j in range(plant.counts[c, EFFORTS]):
         o = plant.offsets[c, j]
-        p0, p1 = plant.coefficients[c, j, 0], plant.coefficients[c, j, 1]
+        p1 = plant.coefficients[c, j, 1]
         side = int(plant.coefficients[c, j, 2])
         if plant.laws[c, j] == 13:
             mean = 0.5 * (z[0, o] ** 2 + z[1, o] ** 2)
             if node == 2:
                 mean = (z[0, o] ** 2 + 4.0 * z[1, o] ** 2 + z[2, o] ** 2) / 6.0
             few[NOW, side] = few[MEMORY, side] * math.exp(-step / p1) + step * mean
-        elif plant.laws[c, j] == 14:
-            mean = 0.5 * (z[0, o] / p1 - z[0, o + 1] + z[1, o] / p1 - z[1, o + 1])
-            if node == 2:
-                mean = (z[0, o] / p1 - z[0, o + 1] + 4.0 * (z[1, o] / p1 - z[1, o + 1])
-                        + z[2, o] / p1 - z[2, o + 1]) / 6.0
-            few[NOW, GAPS + side] = max(-0.5 * p0, min(
-                0.5 * p0, few[MEMORY, GAPS + side] + step * mean))
         elif plant.laws[c, j] == 17:
             share = z[node, o + 1] / plant.coefficients[c, j, 3]
             limit = p1 * math.exp(-share * share)

@@ -31,7 +31,6 @@ from lg_husky_sim.simulation.arrays import (
     AIMS,
     BEYOND_PLACE,
     COMMANDED,
-    CONTEXT,
     DRIVEN,
     DU,
     EFFORTS,
@@ -56,7 +55,6 @@ from lg_husky_sim.simulation.arrays import (
     Packed,
     PAIRS,
     PARABOLA,
-    PLAY,
     RAMPS,
     REALS,
     REMEMBERING,
@@ -84,8 +82,9 @@ COLUMNS = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate', 'current_left', '
 #: many entries there are behind those.
 SHAPED = 4 + 3 + MEMORIES
 WANTED, TAIL = SHAPED + 2, SHAPED + 4
-#: Shortest and longest step of a plant with efforts [s].
-SHORTEST, LONGEST = 1e-5, 0.05
+#: Shortest and longest step of a plant with efforts [s], and by what factor the longest one grows
+#: with each step after one that did not converge.
+SHORTEST, LONGEST, LENGTHENED = 1e-5, 0.05, 1.3
 #: Panels of the pose: the first after a jump [s], growth with the time since then, the longest
 #: [s], turned in one [rad], and how much faster than at the last point a base may turn [rad/s].
 PANEL_FIRST, PANEL_GROWTH, PANEL, PANEL_TURN, FASTER = 0.0005, 0.35, 0.008, 0.01, 0.5
@@ -105,18 +104,6 @@ def _change_set(bases: FloatArray, old: int, c: int, s: FloatArray, modes: Float
         value = s[i]
         for m in range(modes.shape[1]):
             modes[XI, m] += bases[c, 1, i, m] * value
-
-
-@jit_part
-def _play_at(work: Work, goal: float, whole: float) -> None:
-    # Play of both gears and its rates: a parabola through the places where it is known.
-    few = work.few
-    for i in range(2, 4):
-        begin, middle, finish = few[MEMORY, i], few[KEPT, i], few[KEPT + 1, i]
-        slope = (4.0 * middle - 3.0 * begin - finish) / whole
-        bend_by = 2.0 * (begin - 2.0 * middle + finish) / (whole * whole)
-        few[PLAY, i - 2] = begin + goal * (slope + goal * bend_by)
-        few[PLAY, i] = slope + 2.0 * goal * bend_by
 
 
 @jit_part
@@ -163,13 +150,10 @@ def _enter(s: FloatArray, n: int, few: FloatArray) -> None:
     for i in range(2):
         few[LIMITED, i], few[COMMANDED, i] = s[n + SHAPED + i], s[n + WANTED + i]
         few[AIMS, i], few[SLOPES, i], few[RAMPS, i] = 0.0, 0.0, math.inf
-        few[PLAY, i], few[PLAY, 2 + i] = s[n + 9 + i], 0.0
         few[U, i], few[DU, i] = 0.0, 0.0
     for i in range(MEMORIES):
         few[MEMORY, i] = s[n + 7 + i]
     few[TANGENT, 0], few[TANGENT, 1] = math.cos(s[n + 3]), math.sin(s[n + 3])
-    # The laws' sub-step: there is none between events.
-    few[CONTEXT, 6] = 0.0
 
 
 @jit_part
@@ -222,7 +206,7 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
     kind, onset = stages[0, KIND], stages[0, ONSET]
     t, until, end, leg, begun = s[n + 6], s[n + 6], s[n + 6], -1, 0
     j, c, steps, count, given, beyond = 0, -1, 0, 0, 0, False
-    h, before, growth = 0.0, 0.0, 1.0
+    h, before, growth, longest = 0.0, 0.0, 1.0, LONGEST
     # The first step after a jump of the voltage: its length, the jump and the error.
     opening, jump, opened = 0.0, 0.0, 0.0
     while True:
@@ -258,7 +242,7 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
                     share = 0.5 * jump / (size_of * max(opened, 1e-3))
                 h = max(h, opening * max(0.1, min(5.0, math.sqrt(math.sqrt(share)))))
             jump = size_of
-            before, growth = 0.0, 1.0
+            before, growth, longest = 0.0, 1.0, LONGEST
             if count > 0:
                 efforts_at(plant, c, s, n, t, 0.0, 0, 0, work)
                 for e in range(count):
@@ -276,20 +260,22 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
             h = left
             bend(plant, c, h, work)
         else:
-            h = min(h, LONGEST)
+            h = min(h, longest)
             if h >= 0.8 * left:
                 h = left
             elif h > 0.5 * left:
                 h = 0.5 * left
             error = solve(plant, c, s, n, t, h, before, work)
             if error < 0.0 and h > 1.5 * SHORTEST:
-                h, before = max(SHORTEST, 0.3 * h), 0.0
+                # Steps as long would not converge for a while.
+                h, longest = max(SHORTEST, 0.3 * h), 0.5 * h
                 continue
             share = 0.85 / math.sqrt(math.sqrt(max(error, 1e-3)))
             if error > 1.0 and h > 1.5 * SHORTEST:
                 h = max(SHORTEST, h * max(0.2, min(0.5, share)))
                 continue
             growth = max(0.3, min(3.0, share))
+            longest = min(LENGTHENED * longest, LONGEST)
             if before == 0.0:
                 opening, opened = h, error
         steps += 1
@@ -338,10 +324,8 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
                 few[LAST, 2] = lanes[OUTPUTS + ACCELERATION, g]
                 few[LAST, 3] = lanes[OUTPUTS + YAW_ACCELERATION, g]
                 if j < times.size and times[j] - t <= tau:
-                    if counts[c, REMEMBERING] and whole > 0.0:
-                        _play_at(work, tau, whole)
                     while j < times.size and times[j] - t <= tau:
-                        write_row(out, places[j], lanes, g, s, n, few)
+                        write_row(out, places[j], lanes, g, s, n)
                         j += 1
                 if tau >= h:
                     break

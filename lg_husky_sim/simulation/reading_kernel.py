@@ -29,7 +29,6 @@ from lg_husky_sim.simulation.arrays import (
     Packed,
     PAIRS,
     PARABOLA,
-    PLAY,
     RATE,
     RATES,
     REALS,
@@ -212,15 +211,13 @@ def go_by_arc(went: float, turned: float) -> tuple[float, float, float, float]:
 
 
 @jit_part
-def write_row(out: FloatArray, place: int, lanes: FloatArray, g: int, s: FloatArray, n: int,
-              few: FloatArray) -> None:
-    """Write an output row; encoders turn with the motors, ahead of the wheels by the play."""
+def write_row(out: FloatArray, place: int, lanes: FloatArray, g: int, s: FloatArray, n: int
+              ) -> None:
+    """Write an output row."""
     for i in range(7):
         out[place, i] = lanes[OUTPUTS + i, g]
     for i in range(4):
         out[place, 7 + i] = s[n + i] + lanes[DRIVEN + i, g]
     for i in range(2):
-        out[place, i] += few[PLAY, 2 + i]
-        out[place, 7 + i] += few[PLAY, i]
         out[place, 11 + i] = s[n + 4 + i]
         out[place, 13 + i] = lanes[OUTPUTS + 7 + i, g]

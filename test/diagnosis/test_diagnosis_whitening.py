@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from lg_husky_sim.diagnosis.evidence.deviation import slow_model
+from lg_husky_sim.diagnosis.evidence.deviation import axle_inertias, slow_model
 from lg_husky_sim.diagnosis.evidence.drives import Channel, drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import (
@@ -166,7 +166,7 @@ def test_a_decay_faster_than_a_step_of_the_filter_is_slowed_and_no_gain_with_it(
     model = load_model()
     usual, stiff = (slow_model(
         compile_model(model.structure).at(model.parameters.replacing({'yaw_inertia': inertia})),
-        model.parameters['mass'], inertia, model.parameters['wheel_inertia'])
+        model.parameters['mass'], inertia, axle_inertias(model.structure, model.parameters))
         for inertia in (model.parameters['yaw_inertia'], 0.01))
     rate, by_moment, by_voltage = (MODEL.index(name) for name in (
         'turn_by_turn', 'turn_by_moment', 'turn_by_voltage_right'))
@@ -180,8 +180,8 @@ def _by_torque(**sizes: float) -> float:
     model, loop = load_model(), Effect('speed_loop')
     plant = compile_model(model.structure.with_effect(loop)).at(
         model.parameters.with_entries(*entries_of(loop, {'loop_lag': 0.1, **sizes})))
-    found = slow_model(plant, *(model.parameters[name] for name in (
-        'mass', 'yaw_inertia', 'wheel_inertia')))
+    found = slow_model(plant, model.parameters['mass'], model.parameters['yaw_inertia'],
+                       axle_inertias(model.structure, model.parameters))
     return float(found[MODEL.index('left_by_left')])
 
 
@@ -189,6 +189,21 @@ def test_a_loop_holds_wheels_at_once_only_where_its_integral_is_fast() -> None:
     without = _by_torque(loop_gain=1.0, loop_integral=0.0)
     assert _by_torque(loop_gain=1.0, loop_integral=0.5) == pytest.approx(without, rel=0.05)
     assert abs(_by_torque(loop_gain=1.0, loop_integral=100.0)) < 1e-9 * without
+
+
+def test_a_torque_on_wheels_does_as_much_with_the_inertia_parted() -> None:
+    """Between motor and wheels, or between the axles of a side, which hold each other."""
+    def by_torque(*effects: str) -> float:
+        structure, entries = load_model().structure, []
+        for effect in map(Effect, effects):
+            structure = structure.with_effect(effect)
+            entries += [p.parameter() for p in effect.parameters()]
+        numbers = load_model().parameters.with_entries(*entries)
+        found = slow_model(compile_model(structure).at(numbers), numbers['mass'],
+                           numbers['yaw_inertia'], axle_inertias(structure, numbers))
+        return float(found[MODEL.index('speed_by_left')])
+    assert by_torque('gear_backlash') == pytest.approx(by_torque(), rel=1e-6)
+    assert by_torque('belt_compliance', 'gear_backlash') == pytest.approx(by_torque(), rel=1e-6)
 
 
 def test_wheels_that_a_loop_holds_are_whitened_to_finite_numbers(

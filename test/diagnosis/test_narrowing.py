@@ -32,7 +32,7 @@ def test_a_number_that_fits_hardly_move_begins_where_it_is(
     start = beginning(model.structure, base_unknowns(model.parameters, [own]),
                       model.parameters, Reading())
     hypothesis = next(h for h in hypotheses(start.structure) if h.effect.id == effect)
-    true = hypothesis.point(start, {name: value})
+    true = hypothesis.point(start, {**hypothesis.starts[0], name: value})
     plant = true.plant
     known = replace(own, measured=observe(simulate(plant, own, true.log), own, true.log))
     with threads(1) as pool:

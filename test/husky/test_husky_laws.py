@@ -18,12 +18,12 @@ COEFFICIENTS = {
     Law.HEADING: 2, Law.WHEEL_PHASE: 8, Law.SLIP_SATURATION: 2, Law.CURRENT_LIMIT: 3,
     Law.DEAD_ZONE: 1, Law.DEAD_BAND: 2, Law.SOFT_BAND: 1, Law.CLIP: 1, Law.BUS_SAG: 2,
     Law.DROOP: 2,
-    Law.HEATING: 3, Law.BACKLASH: 3, Law.FRICTION_CIRCLE: 3, Law.STICTION: 5,
+    Law.HEATING: 3, Law.BACKLASH: 2, Law.FRICTION_CIRCLE: 3, Law.STICTION: 5,
     Law.YIELDING: 2,
 }
-ARGUMENTS = {Law.MODULATED_DAMPING: 2, Law.CURRENT_LIMIT: 2, Law.BUS_SAG: 4, Law.BACKLASH: 3,
+ARGUMENTS = {Law.MODULATED_DAMPING: 2, Law.CURRENT_LIMIT: 2, Law.BUS_SAG: 4, Law.BACKLASH: 2,
              Law.FRICTION_CIRCLE: 2, Law.STICTION: 2}
-SIDED = (Law.WHEEL_PHASE, Law.HEATING, Law.BACKLASH, Law.STICTION)
+SIDED = (Law.WHEEL_PHASE, Law.HEATING, Law.STICTION)
 
 
 def opcode(law: int, coefficients: FloatArray, z: FloatArray, context: FloatArray | None = None,
@@ -63,11 +63,8 @@ def test_expression_and_opcode_agree(law: Law) -> None:
         z = generator.normal(scale=2.0, size=ARGUMENTS.get(law, 1))
         context = np.abs(generator.normal(scale=3.0, size=CONTEXT))
         memory = generator.uniform(-1.0, 1.0, MEMORY)
-        rate = z[0] / p[1] - z[1] if law == Law.BACKLASH else 1.0
-        left = 0.5 * p[0] - math.copysign(1.0, rate) * memory[2 + side]
         signals = {'time': context[0], 'heading': context[1], 'angle': context[4 + side],
-                   'heat': memory[side], 'held': memory[HELD + side],
-                   'in_play': max(0.0, min(1.0, left / (abs(rate) * context[6])))}
+                   'heat': memory[side], 'held': memory[HELD + side]}
         got = opcode(law, p, z, context, memory, before=int(generator.integers(3)))
         assert got == pytest.approx(expression(law, p, z, **signals), rel=1e-12, abs=1e-13)
         values.append(got)

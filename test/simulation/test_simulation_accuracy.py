@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 SENSORS = {name for name, kind in catalogue().items() if kind.subsystem.value == 'sensor'}
-STOPS = (Law.BACKLASH, Law.STICTION)
+STOPS = (Law.STICTION,)
 """Laws whose memories have stops, which scipy does not know: they have tests of their own."""
 
 

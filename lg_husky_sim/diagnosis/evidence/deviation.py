@@ -4,8 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.edits import axles
+from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.plant import Plant
+from lg_husky_sim.linear_graph.expressions import evaluate
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -13,15 +18,10 @@ import numpy as np
 SLOW = ('v(M_H)', 'omega(J_H)')
 
 
-def _axle_columns(states: tuple[str, ...], values: dict[str, float]) -> tuple[FloatArray, ...]:
-    columns = []
-    for side in ('L', 'R'):
-        whole, rear = f'omega(J_{side}W)', f'omega(J_R{side})'
-        name, share = (whole, 1.0) if whole in states else (rear, 0.5)
-        column = np.zeros(len(states))
-        column[states.index(name)] = 1.0 / (share * values['wheel_inertia'])
-        columns.append(column)
-    return tuple(columns)
+def axle_inertias(structure: Structure, numbers: Mapping[str, float]) -> dict[str, float]:
+    """Return the inertia that turns with each motor's wheels [kg·m²], by the state of its rate."""
+    return {f'omega({axle.name})': evaluate(axle.value, numbers)
+            for _, axle in axles(structure.network().graph, 'both')}
 
 
 def _in_balance(a: FloatArray) -> FloatArray:
@@ -35,7 +35,7 @@ def _in_balance(a: FloatArray) -> FloatArray:
     return np.asarray(np.real((modes * inverse) @ np.linalg.inv(modes)), dtype=np.float64)
 
 
-def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: float
+def slow_model(plant: Plant, mass: float, yaw_inertia: float, axles_of: Mapping[str, float]
                ) -> FloatArray:
     """
     Reduce a plant to forward speed and yaw rate.
@@ -50,8 +50,10 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: flo
     ----------
     plant : Plant
         Its first set is taken.
-    mass, yaw_inertia, wheel_inertia : float
-        [kg], [kg·m²], [kg·m²].
+    mass, yaw_inertia : float
+        [kg], [kg·m²].
+    axles_of : mapping of str to float
+        Of :func:`axle_inertias`: a torque on the wheels of a side acts there.
 
     Returns
     -------
@@ -65,8 +67,10 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, wheel_inertia: flo
     fast = [i for i in range(n) if i not in slow]
     force, moment = np.zeros(n), np.zeros(n)
     force[slow[0]], moment[slow[1]] = 1.0 / mass, 1.0 / yaw_inertia
-    inputs = np.column_stack([
-        force, moment, *_axle_columns(states, {'wheel_inertia': wheel_inertia})])
+    torques = np.zeros((n, len(axles_of)))
+    for side, (name, inertia) in enumerate(axles_of.items()):
+        torques[states.index(name), side] = 1.0 / inertia
+    inputs = np.column_stack([force, moment, torques])
     a_ff = one.a[np.ix_(fast, fast)]
     inputs = np.hstack([inputs, one.b])
     follow = -_in_balance(a_ff) @ np.hstack([one.a[np.ix_(fast, slow)], inputs[fast]])

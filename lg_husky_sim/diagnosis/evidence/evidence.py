@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.bounded_step import step_inside
-from lg_husky_sim.diagnosis.evidence.deviation import slow_model
+from lg_husky_sim.diagnosis.evidence.deviation import axle_inertias, slow_model
 from lg_husky_sim.diagnosis.evidence.differences import Differences
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.frames import frame_of
@@ -301,9 +301,9 @@ class Evidence:
 
     def deviations(self, point: Point) -> list[FloatArray]:
         """Return the deviation model of each drive."""
-        numbers = point.numbers
-        return [slow_model(plant, numbers['mass'], numbers['yaw_inertia'],
-                           numbers['wheel_inertia']) for plant in self.plants(point.plant)]
+        numbers, inertias = point.numbers, axle_inertias(point.structure, point.numbers)
+        return [slow_model(plant, numbers['mass'], numbers['yaw_inertia'], inertias)
+                for plant in self.plants(point.plant)]
 
     def with_whiteners(self, whiteners: Sequence[Whitener]) -> Evidence:
         """Return this evidence with other whiteners."""

@@ -21,7 +21,7 @@ from lg_husky_sim.errors import LgHuskyError
 
 def narrowed(evidence: Evidence, hypothesis: Hypothesis, point: Point) -> Numbers | None:
     """
-    Return the likeliest number of an effect with all else as it is.
+    Return the likeliest first number of an effect with all else as it is.
 
     The best of its starts and of the geometric means between neighbours, again and again.
 
@@ -37,19 +37,22 @@ def narrowed(evidence: Evidence, hypothesis: Hypothesis, point: Point) -> Number
     Returns
     -------
     mapping of str to float, or None
-        None for effects of several numbers, or with fewer starts than tell a maximum.
+        None for effects with several numbers that begin at more than one size, or with fewer
+        starts than tell a maximum.
 
     """
-    name = hypothesis.free[0].name
+    name, *rest = (parameter.name for parameter in hypothesis.free)
+    others = {one: hypothesis.starts[0][one] for one in rest}
     values = sorted({start[name] for start in hypothesis.starts})
-    if len(hypothesis.free) > 1 or len(values) < 3 or values[0] <= 0.0:
+    if len(values) < 3 or values[0] <= 0.0 or any(
+            start[one] != others[one] for start in hypothesis.starts for one in rest):
         return None
     costs: dict[float, float] = {}
 
     def cost(value: float) -> float:
         if value not in costs:
             try:
-                there = hypothesis.point(point, {name: value})
+                there = hypothesis.point(point, {name: value, **others})
                 costs[value] = evidence.cost(evidence.residuals(evidence.predict(there)), there)
             except LgHuskyError:
                 costs[value] = math.inf
@@ -59,4 +62,4 @@ def narrowed(evidence: Evidence, hypothesis: Hypothesis, point: Point) -> Number
         values = values[max(place - 1, 0):place + 2]
         between = [math.sqrt(a * b) for a, b in itertools.pairwise(values)]
         values = sorted({*values, *between})
-    return {name: min(values, key=cost)}
+    return {name: min(values, key=cost), **others}

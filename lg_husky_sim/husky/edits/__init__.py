@@ -16,10 +16,10 @@ import importlib
 import pkgutil
 
 from lg_husky_sim.errors import ParameterError
-from lg_husky_sim.husky.edits.network import branch_of, Edit, EditedNetwork
+from lg_husky_sim.husky.edits.network import axles, branch_of, Edit, EditedNetwork
 from lg_husky_sim.husky.effects import Effect
 
-__all__ = ['EditedNetwork', 'branch_of', 'edit', 'edits', 'stage_of']
+__all__ = ['EditedNetwork', 'axles', 'branch_of', 'edit', 'edits', 'stage_of']
 
 
 @cache

@@ -75,15 +75,9 @@ def _ripple(shape: str, number: str, side: float, rate: str) -> tuple[LawRow, tu
         'ripple_cos', 'ripple_sin', side, 'ripple_speed', *twice, *thrice)), (rate,)
 
 
-def _play(shape: str, number: str, side: float, rate: str) -> tuple[LawRow, tuple[str, ...]]:
-    row = LawRow(Law.BACKLASH, ('play', 'torque_constant*gear_ratio', side))
-    return row, (f'V(V_S{number})', rate, f'i(L_{number})')
-
-
 EDITS = {
     'belt_compliance': Edit(_belt),
     'viscous_asymmetry': Edit(_asymmetry, Stage.VALUES),
     'coulomb_drivetrain': _on_axles(_dry),
     'torque_ripple': _on_axles(_ripple),
-    'gear_backlash': _on_axles(_play),
 }

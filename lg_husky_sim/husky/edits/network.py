@@ -62,6 +62,9 @@ class EditedNetwork:
         Time constant by which the base smooths its commands; empty where it does not.
     grip : expression
         Factor on the limit of a tyre's force.
+    counted : mapping of str to str
+        Inertia that the encoder of a side turns with, by the letter of the side, where that is
+        not the axle of its motor.
 
     """
 
@@ -72,6 +75,7 @@ class EditedNetwork:
     speed_loop: bool = False
     command_lag: str = ''
     grip: str = ''
+    counted: Mapping[str, str] = field(default_factory=dict)
 
     def changing(self, command: Mapping[str, str] | None = None,
                  sensors: Mapping[str, str] | None = None) -> EditedNetwork:
@@ -129,8 +133,13 @@ class EditedNetwork:
                          ) -> EditedNetwork:
         """Return this network with a modulated through-source beside a wheel's slip element."""
         slip = branch_of(self.graph, f'B_{wheel}')
-        source = Branch(name, Kind.THROUGH_SOURCE, slip.domain, slip.tail, slip.head,
-                        characteristic=_characteristic(row, (f'omega(B_{wheel})', *others)))
+        return self.with_torque_beside(name, slip, row, f'omega({slip.name})', *others)
+
+    def with_torque_beside(self, name: str, element: Branch, row: LawRow, *of: str
+                           ) -> EditedNetwork:
+        """Return this network with a modulated through-source beside an element."""
+        source = Branch(name, Kind.THROUGH_SOURCE, element.domain, element.tail, element.head,
+                        characteristic=_characteristic(row, of))
         return replace(self, graph=self.graph.with_branches(source),
                        laws={**self.laws, name: row})
 
