@@ -175,7 +175,7 @@ def test_no_law_is_shown_with_terms_that_are_zero() -> None:
     nominal = lg.Husky()
     shown = [line for name in catalogue() for line in new_terms(
         nominal.with_effect(name).model, nominal.model.structure)]
-    assert any('in_play*i(L_1)' in line for line in shown)
+    assert any('omega(B_teeth_L)' in line for line in shown)
     assert not [line for line in shown if re.search(r'\b0(\.0)?\)?\*', line)]
 
 
