@@ -82,9 +82,8 @@ COLUMNS = ('wheel_left', 'wheel_right', 'forward', 'yaw_rate', 'current_left', '
 #: many entries there are behind those.
 SHAPED = 4 + 3 + MEMORIES
 WANTED, TAIL = SHAPED + 2, SHAPED + 4
-#: Shortest and longest step of a plant with efforts [s], and by what factor the longest one grows
-#: with each step after one that did not converge.
-SHORTEST, LONGEST, LENGTHENED = 1e-5, 0.05, 1.3
+#: Shortest and longest step of a plant with efforts [s].
+SHORTEST, LONGEST = 1e-5, 0.05
 #: Panels of the pose: the first after a jump [s], growth with the time since then, the longest
 #: [s], turned in one [rad], and how much faster than at the last point a base may turn [rad/s].
 PANEL_FIRST, PANEL_GROWTH, PANEL, PANEL_TURN, FASTER = 0.0005, 0.35, 0.008, 0.01, 0.5
@@ -206,7 +205,7 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
     kind, onset = stages[0, KIND], stages[0, ONSET]
     t, until, end, leg, begun = s[n + 6], s[n + 6], s[n + 6], -1, 0
     j, c, steps, count, given, beyond = 0, -1, 0, 0, 0, False
-    h, before, growth, longest = 0.0, 0.0, 1.0, LONGEST
+    h, before, growth = 0.0, 0.0, 1.0
     # The first step after a jump of the voltage: its length, the jump and the error.
     opening, jump, opened = 0.0, 0.0, 0.0
     while True:
@@ -242,7 +241,7 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
                     share = 0.5 * jump / (size_of * max(opened, 1e-3))
                 h = max(h, opening * max(0.1, min(5.0, math.sqrt(math.sqrt(share)))))
             jump = size_of
-            before, growth, longest = 0.0, 1.0, LONGEST
+            before, growth = 0.0, 1.0
             if count > 0:
                 efforts_at(plant, c, s, n, t, 0.0, 0, 0, work)
                 for e in range(count):
@@ -260,22 +259,20 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
             h = left
             bend(plant, c, h, work)
         else:
-            h = min(h, longest)
+            h = min(h, LONGEST)
             if h >= 0.8 * left:
                 h = left
             elif h > 0.5 * left:
                 h = 0.5 * left
             error = solve(plant, c, s, n, t, h, before, work)
             if error < 0.0 and h > 1.5 * SHORTEST:
-                # Steps as long would not converge for a while.
-                h, longest = max(SHORTEST, 0.3 * h), 0.5 * h
+                h, before = max(SHORTEST, 0.3 * h), 0.0
                 continue
             share = 0.85 / math.sqrt(math.sqrt(max(error, 1e-3)))
             if error > 1.0 and h > 1.5 * SHORTEST:
                 h = max(SHORTEST, h * max(0.2, min(0.5, share)))
                 continue
             growth = max(0.3, min(3.0, share))
-            longest = min(LENGTHENED * longest, LONGEST)
             if before == 0.0:
                 opening, opened = h, error
         steps += 1

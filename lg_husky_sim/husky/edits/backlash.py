@@ -4,8 +4,8 @@
 Free play of the gears, with an inertia on either side of it.
 
 What a graph of one inertia a side lumps together is parted: a share of it turns with the motor,
-the rest with the wheels. Between them are the teeth, a stiff spring beside a damper whose torque t
-first has to take up the play::
+the rest with the wheels. Between them are the teeth, a spring beside a damper whose torque t first
+has to take up the play::
 
     J_M w_M' = T i - d(t),   J_W w_W' = d(t) - load,   t = K twist + B (w_M - w_W)
     d(t) = sgn(t) max(|t| - K play / 2, 0)
