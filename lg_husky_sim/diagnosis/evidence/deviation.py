@@ -35,7 +35,7 @@ def _in_balance(a: FloatArray) -> FloatArray:
     return np.asarray(np.real((modes * inverse) @ np.linalg.inv(modes)), dtype=np.float64)
 
 
-def slow_model(plant: Plant, mass: float, yaw_inertia: float, axles_of: Mapping[str, float]
+def slow_model(plant: Plant, mass: float, yaw_inertia: float, inertias: Mapping[str, float]
                ) -> FloatArray:
     """
     Reduce a plant to forward speed and yaw rate.
@@ -52,7 +52,7 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, axles_of: Mapping[
         Its first set is taken.
     mass, yaw_inertia : float
         [kg], [kg·m²].
-    axles_of : mapping of str to float
+    inertias : mapping of str to float
         Of :func:`axle_inertias`: a torque on the wheels of a side acts there.
 
     Returns
@@ -67,8 +67,8 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, axles_of: Mapping[
     fast = [i for i in range(n) if i not in slow]
     force, moment = np.zeros(n), np.zeros(n)
     force[slow[0]], moment[slow[1]] = 1.0 / mass, 1.0 / yaw_inertia
-    torques = np.zeros((n, len(axles_of)))
-    for side, (name, inertia) in enumerate(axles_of.items()):
+    torques = np.zeros((n, len(inertias)))
+    for side, (name, inertia) in enumerate(inertias.items()):
         torques[states.index(name), side] = 1.0 / inertia
     inputs = np.column_stack([force, moment, torques])
     a_ff = one.a[np.ix_(fast, fast)]
