@@ -67,14 +67,14 @@ class Packed(NamedTuple):
 LANES = 8
 #: Rows of ``Work.modes``: those at the start of a step, their rate then, slope and bend of their
 #: forcing, something for a moment, those inside the step, and phi_1 to phi_4 for a quarter of
-#: the step, its half and the whole.
-XI, RATE, SLOPE, BEND, FORCE, INSIDE, PHI, MODE_ROWS = 0, 1, 2, 3, 4, 5, 6, 18
+#: the step, its half, the whole and three quarters.
+XI, RATE, SLOPE, BEND, FORCE, INSIDE, PHI, MODE_ROWS = 0, 1, 2, 3, 4, 5, 6, 22
 #: Rows of ``Work.efforts``: at start, middle and end of a step; slope and bend of the parabola
-#: through them, and of that of the step before; what the laws differ from the parabola at a
-#: quarter, the middle and the end, and did before; what the laws just said.
+#: through them, and of that of the step before; what the laws differ from the parabola between
+#: the nodes, at the middle and the end, and did before; what the laws just said.
 F, PARABOLA, FORMER, CHANGE, OLD, NEW, EFFORT_ROWS = 0, 3, 5, 7, 10, 13, 14
-#: Rows of ``Work.arguments``: at start, middle, end and quarter of a step; integrals of them.
-QUARTER, SWEPT, ARGUMENT_ROWS = 3, 4, 5
+#: Rows of ``Work.arguments``: at start, middle and end of a step, and between; integrals of them.
+BETWEEN, SWEPT, ARGUMENT_ROWS = 3, 4, 5
 #: Rows of ``Work.lanes``: times since the start of the step [s], those beyond the last point
 #: repeat it; exp(z) - 1 of a pair of modes; outputs; what wheels turned [rad], the base went [m]
 #: and turned [rad] since the start of the step; from row INTEGRALS on those of the modes, and
@@ -86,9 +86,10 @@ YAW_ACCELERATION, ACCELERATION, ROWS = 9, 10, 11
 #: and inside it; voltages, their slopes, those inside a step; command in force, behind limits
 #: and ramps, slopes of the ramps, times at which they end, and where; direction (cosine, sine);
 #: integrals of wheel rates, speed and yaw rate over a part of a step; speed, yaw rate and their
-#: derivatives at the last point.
+#: derivatives at the last point; what memories with stops add up to by the middle of a step, and
+#: what they would be at its end without a look at the middle, less what they are.
 (CONTEXT, MEMORY, KEPT, NOW, U, DU, U_INSIDE, COMMANDED, LIMITED, SLOPES, RAMPS, AIMS, TANGENT,
- PART, LAST, FEW_ROWS) = 0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16
+ PART, LAST, WAY, ASTRAY, FEW_ROWS) = 0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18
 #: Their length.
 FEW = 8
 

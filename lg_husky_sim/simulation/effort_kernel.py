@@ -4,7 +4,8 @@
 Parts of the event-driven kernel: one step of a plant with efforts.
 
 A parabola through the efforts at the start, the middle and the end of a step forces the modes;
-middle and end are found by iteration. What the laws differ from it at a quarter is the error.
+middle and end are found by iteration. What the laws differ from it at a quarter and at three
+quarters is the error: a kink between would show at one of them only.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from lg_husky_sim.jit import jit_part
 from lg_husky_sim.signals import FloatArray
 from lg_husky_sim.simulation.arrays import (
     ADDING,
+    ASTRAY,
     BEND,
+    BETWEEN,
     CHANGE,
     CONTEXT,
     DU,
@@ -41,7 +44,6 @@ from lg_husky_sim.simulation.arrays import (
     PART,
     PHI,
     POSED,
-    QUARTER,
     REALS,
     REMEMBERING,
     SLOPE,
@@ -49,16 +51,17 @@ from lg_husky_sim.simulation.arrays import (
     TANGENT,
     U,
     U_INSIDE,
+    WAY,
     Work,
     XI,
 )
-from lg_husky_sim.simulation.modal_kernel import advance, doubled, phis
+from lg_husky_sim.simulation.modal_kernel import added, advance, phis
 
 #: Error of a step that is allowed: wheel rates [rad/s], speed [m/s], yaw rate [rad/s].
 WHEEL_ERROR, SPEED_ERROR, YAW_ERROR = 2e-5, 3e-6, 5e-6
 #: Iterations of a step at most, and the share of the allowed error at which they end.
 ITERATIONS, CONVERGED = 8, 0.1
-#: Error of a step, as a multiple of what the laws differ from the parabola at its quarter.
+#: Error of a step, as a multiple of what the laws differ from the parabola between its nodes.
 DEFECT = 2.0
 #: Speed from which a ripple counts whole, in widths of its standstill.
 AWAY = 3.0
@@ -121,9 +124,15 @@ def memories(plant: Packed, c: int, z: FloatArray, node: int, step: float, few: 
             few[NOW, side] = few[MEMORY, side] * math.exp(-step / p1) + step * mean
         elif plant.laws[c, j] == 17:
             share = z[node, o + 1] / plant.coefficients[c, j, 3]
-            limit = p1 * math.exp(-share * share)
-            few[NOW, HELD + side] = max(-limit, min(
-                limit, few[MEMORY, HELD + side] + z[SWEPT, o]))
+            limit, swept, m = p1 * math.exp(-share * share), z[SWEPT, o], HELD + side
+            few[NOW, m] = max(-limit, min(limit, few[MEMORY, m] + swept))
+            if node == 1:
+                few[WAY, m] = swept
+            else:
+                # By way of the middle, where the limit may have been less.
+                whole = few[NOW, m]
+                few[NOW, m] = max(-limit, min(limit, few[KEPT, m] + swept - few[WAY, m]))
+                few[ASTRAY, m] = whole - few[NOW, m]
 
 
 @jit_part
@@ -164,8 +173,8 @@ def efforts_at(plant: Packed, c: int, s: FloatArray, n: int, time: float, at: fl
     """
     Evaluate the laws inside a step into the row NEW, ``at`` [s] after its start.
 
-    ``node`` counts the phis: for a quarter of the step, its middle and its end; ``row`` of the
-    arguments receives those of the laws. At the start, all of it is zero.
+    ``node`` counts the phis: for a quarter of the step, its middle, its end and three quarters;
+    ``row`` of the arguments receives those of the laws. At the start, all of it is zero.
     """
     n_real, n_pairs = plant.counts[c, REALS], plant.counts[c, PAIRS]
     modes, few, modal = work.modes, work.few, plant.modal
@@ -192,13 +201,16 @@ def efforts_at(plant: Packed, c: int, s: FloatArray, n: int, time: float, at: fl
     remembered = MEMORY
     if plant.counts[c, REMEMBERING] and at > 0.0:
         remembered = NOW
-        if node > 0:
+        between = node == 0 or node == 3
+        if not between:
             memories(plant, c, work.arguments, node, at, few)
         for i in range(MEMORIES):
-            if node > 0:
+            if not between:
                 few[KEPT + node - 1, i] = few[NOW, i]
-            else:
+            elif node == 0:
                 few[NOW, i] = 0.5 * (few[MEMORY, i] + few[KEPT, i])
+            else:
+                few[NOW, i] = 0.5 * (few[KEPT, i] + few[KEPT + 1, i])
     evaluate(c, plant.laws, plant.coefficients, plant.offsets, work.arguments[row], few[CONTEXT],
              few[remembered], work.efforts[NEW])
 
@@ -240,6 +252,16 @@ def _passed(plant: Packed, c: int, z: FloatArray) -> float:
 
 
 @jit_part
+def _astray(plant: Packed, c: int, few: FloatArray, efforts: FloatArray) -> None:
+    # Put what the efforts differ by whose memory depends on the way into the row CHANGE.
+    for e in range(plant.counts[c, EFFORTS]):
+        efforts[CHANGE, e] = 0.0
+        if plant.laws[c, e] == 17:
+            efforts[CHANGE, e] = plant.coefficients[c, e, 0] / plant.coefficients[c, e, 1] * few[
+                ASTRAY, HELD + int(plant.coefficients[c, e, 2])]
+
+
+@jit_part
 def solve(plant: Packed, c: int, s: FloatArray, n: int, time: float, h: float, before: float,
           work: Work) -> float:
     """
@@ -270,7 +292,8 @@ def solve(plant: Packed, c: int, s: FloatArray, n: int, time: float, h: float, b
     phis(0.25 * h, plant.modal, c, n_real, n_pairs, work.modes)
     for node in range(1, 3):
         at = 0.5 * node * h
-        doubled(0.5 * at, plant.modal, c, n_real, n_pairs, work.modes, PHI + 4 * (node - 1))
+        p = PHI + 4 * (node - 1)
+        added(0.5 * at, 1.0, plant.modal, c, n_real, n_pairs, work.modes, p, p, p + 4)
         for e in range(count):
             efforts[F + node, e], efforts[OLD + node, e] = efforts[F, e], 0.0
             if before > 0.0:
@@ -278,25 +301,31 @@ def solve(plant: Packed, c: int, s: FloatArray, n: int, time: float, h: float, b
                 square = efforts[FORMER + 1, e]
                 slope = efforts[FORMER, e] + 2.0 * before * square
                 efforts[F + node, e] += at * (slope + at * square)
+    added(0.5 * h, 0.5, plant.modal, c, n_real, n_pairs, work.modes, PHI + 4, PHI, PHI + 12)
     error, converged = 0.0, False
     for iteration in range(ITERATIONS + 1):
-        # In the end, once more: what the laws say at a quarter, where no parabola was asked.
+        # In the end, once more: what the laws say at the quarters, where no parabola was asked.
         last, error = error, 0.0
         bend(plant, c, h, work)
-        for k in range(1 if converged else 2):
-            node = 0 if converged else k + 1
-            at = 0.25 * h if converged else 0.5 * node * h
-            efforts_at(plant, c, s, n, time, at, node, QUARTER if converged else node, work)
+        for k in range(2):
+            node = k + 1
+            at = 0.5 * node * h
+            if converged:
+                node, at = 3 * k, (0.25 + 0.5 * k) * h
+            row = CHANGE + (0 if converged else node)
+            efforts_at(plant, c, s, n, time, at, node, BETWEEN if converged else node, work)
             for e in range(count):
-                told = efforts[F + node, e]
+                told = efforts[F if converged else F + node, e]
                 if converged:
                     told += at * (efforts[PARABOLA, e] + at * efforts[PARABOLA + 1, e])
-                efforts[CHANGE + node, e] = efforts[NEW, e] - told
-            # What a change at a quarter does is done over the whole step.
-            error = max(error, effect(plant, c, work, CHANGE + node,
-                                      PHI + 4 * (2 if converged else node),
+                efforts[row, e] = efforts[NEW, e] - told
+            # What a change at the quarters does is done over the whole step.
+            error = max(error, effect(plant, c, work, row, PHI + 4 * (2 if converged else node),
                                       h if converged else at))
         if converged:
+            if plant.counts[c, ADDING]:
+                _astray(plant, c, work.few, efforts)
+                error = max(error, effect(plant, c, work, CHANGE, PHI + 8, h))
             return max(DEFECT * error, _passed(plant, c, work.arguments))
         for node in range(1, 3):
             for e in range(count):

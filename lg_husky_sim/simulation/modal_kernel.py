@@ -118,35 +118,41 @@ def phis(t: float, modal: FloatArray, c: int, n_real: int, n_pairs: int, modes: 
 
 
 @jit_part
-def doubled(t: float, modal: FloatArray, c: int, n_real: int, n_pairs: int, modes: FloatArray,
-            p: int) -> None:
+def added(t: float, ratio: float, modal: FloatArray, c: int, n_real: int, n_pairs: int,
+          modes: FloatArray, p: int, q: int, d: int) -> None:
     """
-    Put phi_k of the rates times 2 ``t`` into the rows from p + 4 on, of those at ``t`` from p on.
+    Put phi_k of the rates times (1 + ratio) ``t`` into the rows from ``d`` on.
 
-    2^k phi_k(2z) = exp(z) phi_k(z) + sum of phi_j(z)/(k - j)! for j = 1 to k.
+    Those at ``t`` are in the rows from ``p`` on, those at ``ratio t`` from ``q`` on: with r for
+    the ratio, z = lambda t and j = 1 to k, (1 + r)^k phi_k(z + r z) = r^k exp(z) phi_k(r z) +
+    sum of r^(k - j) phi_j(z)/(k - j)!.
     """
-    d = p + 4
+    r2 = ratio * ratio
+    s1 = 1.0 / (1.0 + ratio)
+    s2, s3, s4 = s1 * s1, s1 * s1 * s1, s1 * s1 * s1 * s1
     for i in range(modes.shape[1]):
         f1, f2, f3, f4 = modes[p, i], modes[p + 1, i], modes[p + 2, i], modes[p + 3, i]
         e = 1.0 + modal[c, RATES, i] * t * f1
-        modes[d, i] = 0.5 * (e * f1 + f1)
-        modes[d + 1, i] = 0.25 * (e * f2 + f1 + f2)
-        modes[d + 2, i] = 0.125 * (e * f3 + 0.5 * f1 + f2 + f3)
-        modes[d + 3, i] = 0.0625 * (e * f4 + T3 * f1 + 0.5 * f2 + f3 + f4)
+        modes[d, i] = s1 * (ratio * e * modes[q, i] + f1)
+        modes[d + 1, i] = s2 * (r2 * e * modes[q + 1, i] + ratio * f1 + f2)
+        modes[d + 2, i] = s3 * (ratio * r2 * e * modes[q + 2, i] + 0.5 * r2 * f1 + ratio * f2 + f3)
+        modes[d + 3, i] = s4 * (r2 * r2 * e * modes[q + 3, i] + T3 * ratio * r2 * f1
+                                + 0.5 * r2 * f2 + ratio * f3 + f4)
     for k in range(n_real, n_real + n_pairs):
         m = k + n_pairs
         re, im = modal[c, RATES, k] * t, modal[c, RATES, m] * t
         a = 1.0 + re * modes[p, k] - im * modes[p, m]
         b = re * modes[p, m] + im * modes[p, k]
         for i in range(4):
-            f, g = modes[p + i, k], modes[p + i, m]
+            f, g = modes[q + i, k], modes[q + i, m]
             modes[d + i, k], modes[d + i, m] = a * f - b * g, a * g + b * f
         for i in range(k, m + 1, n_pairs):
             f1, f2, f3, f4 = modes[p, i], modes[p + 1, i], modes[p + 2, i], modes[p + 3, i]
-            modes[d, i] = 0.5 * (modes[d, i] + f1)
-            modes[d + 1, i] = 0.25 * (modes[d + 1, i] + f1 + f2)
-            modes[d + 2, i] = 0.125 * (modes[d + 2, i] + 0.5 * f1 + f2 + f3)
-            modes[d + 3, i] = 0.0625 * (modes[d + 3, i] + T3 * f1 + 0.5 * f2 + f3 + f4)
+            modes[d, i] = s1 * (ratio * modes[d, i] + f1)
+            modes[d + 1, i] = s2 * (r2 * modes[d + 1, i] + ratio * f1 + f2)
+            modes[d + 2, i] = s3 * (ratio * r2 * modes[d + 2, i] + 0.5 * r2 * f1 + ratio * f2 + f3)
+            modes[d + 3, i] = s4 * (r2 * r2 * modes[d + 3, i] + T3 * ratio * r2 * f1
+                                    + 0.5 * r2 * f2 + ratio * f3 + f4)
 
 
 @jit_part

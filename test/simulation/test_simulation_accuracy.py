@@ -67,3 +67,18 @@ def test_the_linear_part_is_exact(effect: Effect | None) -> None:
     """To 1e-9 of what a wheel, the gyro and the heading show; x and y to 1e-8 m."""
     errors = worst(drawn(effect, 2), 2, 3e-13, 1e-15) * np.array(list(NOISE.values()))
     np.testing.assert_array_less(errors, [1e-8, 1e-8, 2e-9, 1e-8, 1e-8, 2e-9])
+
+
+@pytest.mark.parametrize('limit', [13.02, 13.46, 15.08, 16.54])
+def test_a_kink_is_noticed_wherever_in_a_step_it_is(limit: float) -> None:
+    """At these limits a quarter of a step alone sees nothing of where the current is let go."""
+    structure = Structure().with_effect(Effect('current_limit'))
+    own = [p.parameter() for e in structure.effects for p in e.parameters()]
+    plant = compile_model(structure).at(load_model().parameters.with_entries(*own).replacing(
+        {'current_limit': limit}))
+    commands = TimeSeries(np.zeros(1), np.array([[0.5, 0.0]]), ('forward', 'yaw'))
+    times = np.linspace(0.0, 0.02, 81)
+    expected = Reference(plant, 1e-9, 1e-11, 'DOP853').trajectory(commands, times)
+    seen = trajectory(plant, commands, times)
+    error = np.abs(seen.column('wheel_left') - expected.column('wheel_left')).max()
+    assert error < 0.01 * NOISE['wheel_left']
