@@ -73,8 +73,26 @@ class Fit:
     @property
     def descent(self) -> FloatArray:
         """Where the cost falls: less its gradient by the places, shape (k,)."""
-        pulled: FloatArray = self.jacobian.T @ (student.weights(self.whitened) * self.whitened)
-        return pulled - self.point.weights * self.point.prior_residuals
+        return descent_of(self.jacobian, self.whitened, self.point)
+
+    @property
+    def promised(self) -> float:
+        """Return what another step gains by these derivatives [nats]."""
+        return promised_by(self.jacobian, self.whitened, self.point)
+
+
+def descent_of(jacobian: FloatArray, whitened: FloatArray, point: Point) -> FloatArray:
+    """Return less the gradient of the cost by the places of a point, shape (k,)."""
+    pulled: FloatArray = jacobian.T @ (student.weights(whitened) * whitened)
+    return pulled - point.weights * point.prior_residuals
+
+
+def promised_by(jacobian: FloatArray, whitened: FloatArray, point: Point) -> float:
+    """Return what one step from a point gains by derivatives [nats]."""
+    normal = normal_matrix(jacobian, student.weights(whitened)) + np.diag(point.weights ** 2)
+    slope = descent_of(jacobian, whitened, point)
+    # A number that acts nowhere, of an effect without a prior, may leave it singular.
+    return 0.5 * float(slope @ np.linalg.lstsq(normal, slope, rcond=None)[0])
 
 
 class Evidence:

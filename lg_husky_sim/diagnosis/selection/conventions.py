@@ -16,10 +16,8 @@ from dataclasses import replace
 import itertools
 import math
 
-from lg_husky_sim.diagnosis.evidence import student
-from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
+from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, promised_by
 from lg_husky_sim.diagnosis.evidence.point import Point
-from lg_husky_sim.diagnosis.evidence.products import normal_matrix
 from lg_husky_sim.diagnosis.evidence.reading import imu_lag, Reading, wheel_lag, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import start_of, Unknown, window_unknown
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
@@ -76,7 +74,9 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
     best = min(itertools.chain(*raced), key=lambda one: one.cost, default=None)
     if best is None:
         return fit
-    same = min(fit, evidence.fit(fit.point, rounds=rounds), key=lambda one: one.cost)
+    ended = fit.promised < setting('fit_converged')
+    same = fit if ended else min(fit, evidence.fit(fit.point, rounds=rounds),
+                                 key=lambda one: one.cost)
     if best.cost > same.cost - setting('reading_gain'):
         return fit if same.cost > fit.cost - setting('reading_gain') else same
     # The length of a window that was not read before is one more number.
@@ -92,10 +92,14 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
 
 def _raced(evidence: Evidence, begin: Fit, inflation: float, options: Sequence[Reading],
            rounds: int, least: float) -> list[Fit]:
-    # The readings that promise most, and enough, begin; those that are ahead after a few steps
-    # finish.
+    # The readings that promise most, and enough, begin; of those that are ahead after a few steps
+    # the ones go on that may still catch up with the first. Where that was under noise that is
+    # larger than it is, the likeliest goes on under the noise as it is.
     points = [_read_so(evidence, begin.point, one) for one in options]
-    promise = _promise_of(evidence, begin, inflation)
+
+    def promise(point: Point) -> float:
+        e = evidence.residuals(evidence.predict(point)) / inflation
+        return evidence.cost(e, point) - promised_by(begin.jacobian, e, point)
     promised = np.array(list(evidence.pool.map(promise, points)))
     enough = np.flatnonzero(promised <= promise(begin.point) - least)
     order = enough[np.argsort(promised[enough], kind='stable')][:int(setting('readings_fitted'))]
@@ -105,10 +109,14 @@ def _raced(evidence: Evidence, begin: Fit, inflation: float, options: Sequence[R
         return evidence.fit(points[place], begin.slopes, rounds=first, inflation=inflation)
 
     def finished(one: Fit) -> Fit:
-        found = evidence.fit(one.point, one.slopes, rounds=rounds - first, inflation=inflation)
-        return found if inflation == 1.0 else evidence.fit(found.point, rounds=rounds)
+        return evidence.fit(one.point, one.slopes, rounds=rounds - first, inflation=inflation)
     ahead = sorted(evidence.pool.map(begun, order.tolist()), key=lambda one: one.cost)[:last]
-    return list(evidence.pool.map(finished, ahead))
+    ends = list(evidence.pool.map(finished, [
+        one for one in ahead if one.cost - one.promised <= ahead[0].cost]))
+    if inflation == 1.0 or not ends:
+        return ends
+    best = min(ends, key=lambda one: evidence.cost(evidence.residuals(one.predicted), one.point))
+    return [evidence.fit(best.point, rounds=rounds)]
 
 
 def _begun_at(evidence: Evidence, start: Point) -> tuple[Fit, float]:
@@ -197,19 +205,6 @@ def read_like(point: Point, other: Point) -> Point:
     places = np.concatenate([point.places[:split], start_of(new), point.places[split:]])
     return replace(point, reading=other.reading, unknowns=unknowns, places=np.array([
         known.get(u.name, place) for u, place in zip(unknowns, places, strict=True)]))
-
-
-def _promise_of(evidence: Evidence, fit: Fit, inflation: float) -> Callable[[Point], float]:
-    # What a fit would cost after one step from a point, with the derivatives of this one.
-    def promise(point: Point) -> float:
-        e = evidence.residuals(evidence.predict(point)) / inflation
-        weight = student.weights(e)
-        normal = normal_matrix(fit.jacobian, weight) + np.diag(point.weights ** 2)
-        slope = fit.jacobian.T @ (weight * e) - point.weights * point.prior_residuals
-        # A number that acts nowhere, of an effect without a prior, may leave it singular.
-        move = np.linalg.lstsq(normal, slope, rcond=None)[0]
-        return evidence.cost(e, point) - 0.5 * float(slope @ move)
-    return promise
 
 
 def _read_so(evidence: Evidence, point: Point, reading: Reading) -> Point:

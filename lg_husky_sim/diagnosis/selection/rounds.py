@@ -10,6 +10,7 @@ comparable only under one whitener.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 import itertools
 import math
@@ -157,17 +158,18 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
     for _, start in starts.values():
         own = range(size, len(start.unknowns))
         slopes = [np.hstack([one, np.zeros((one.shape[0], len(own)))]) for one in base.slopes]
-        try:
+        # On the brink of running away, some do.
+        with suppress(LgHuskyError):
             best = evidence.fit(start, slopes, rounds=few, renew=own)
             if best.cost < base.cost + setting('lost'):
                 best = evidence.fit(best.point, best.slopes, renew=own)
-                if whole:
-                    best = evidence.fit(best.point, rounds=few)
-        except LgHuskyError:
-            # On the brink of running away.
-            continue
-        found.append(Tried(hypothesis, best, base.cost - best.cost, evidence.count))
-    return max(found, key=lambda one: one.gain, default=None)
+            found.append(best)
+    for best in sorted(found, key=lambda one: one.cost):
+        with suppress(LgHuskyError):
+            if whole and best.cost < base.cost + setting('lost'):
+                best = evidence.fit(best.point, rounds=few)
+            return Tried(hypothesis, best, base.cost - best.cost, evidence.count)
+    return None
 
 
 def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
@@ -212,11 +214,12 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         base = min((evidence.fit(with_jitter(p, evidence), base.slopes) for p in points),
                    key=lambda f: f.cost)
         seen = _looks(evidence, base, pool, [t.hypothesis.effect for t in tried])
-        known = {t.hypothesis.label for t in tried[:3]}
-        chosen = [one for one in seen[:few] if one.hypothesis.label not in known]
-        chosen += [Look(t.hypothesis, numbers_of(t), math.inf) for t in tried[:3]]
+        known = [Look(t.hypothesis, numbers_of(t), math.inf) for t in tried[:3]]
+        once = {one.hypothesis.label: one for one in reversed(known)}
+        chosen = [one for one in seen[:few] if one.hypothesis.label not in once]
         guide = replace(base.point, places=best.fit.point.places[:base.point.places.size])
-        tried = fitted(evidence, base, chosen, [base.point, guide], seen)
+        tried = fitted(evidence, base, [*chosen, *once.values()], [base.point, guide],
+                       [*seen, *known])
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     ranking = replace(ranking, evidence=evidence, base=base)
