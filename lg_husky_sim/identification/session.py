@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from lg_husky_sim.errors import SettingsError
+from lg_husky_sim.folders import check_folder
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.estimate import estimate, STARTS
 from lg_husky_sim.identification.report import report_paths, write_fit
@@ -133,11 +134,11 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
     Raises
     ------
     SettingsError
-        If ``out`` is a file, two recordings would share a name, or one has that of another file.
+        If ``out`` is a file, a recording or cannot be written, two recordings would share a
+        name, or one has that of another file.
 
     """
-    if out.exists() and not out.is_dir():
-        raise SettingsError(f'{out} is not a folder; --each needs one')
+    check_folder(out)
     names = [Path(path).name for path in paths]
     if len(set(names)) != len(names):
         raise SettingsError('two recordings have one name; --each writes a file for each')

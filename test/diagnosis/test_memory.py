@@ -73,3 +73,9 @@ def test_kinds_do_not_take_each_others_room() -> None:
     assert memory.remembered('ways', 0.1, lambda: 'another') == 'way'
     assert memory.remembered('wanted', 2, lambda: 'another') == '2'
     assert memory.remembered('wanted', 0, lambda: 'another') == 'another'
+
+
+def test_what_is_nothing_is_remembered_as_well() -> None:
+    memory = Memory()
+    assert memory.remembered('ways', 1, lambda: 0.0) == 0.0
+    assert memory.remembered('ways', 1, lambda: 1.0) == 0.0

@@ -62,3 +62,16 @@ def test_a_motor_in_play_turns_its_own_inertia_only(robot: Maker, share: float) 
     np.testing.assert_allclose(on_motor.column('forward'), 0.0, rtol=0, atol=1e-4)
     # What the teeth's spring says and the play takes cancels but for the errors of the steps.
     np.testing.assert_allclose(on_wheel.column('wheel_left'), 0.0, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize('shape', ['motor', 'wheel'])
+def test_a_limit_holds_the_current_of_a_motor_in_play(robot: Maker, shape: str) -> None:
+    """Its back-EMF is that of the rotor: what the wheels do does not count until teeth meet."""
+    plant = robot(Effect('gear_backlash', shape=shape), 'current_limit', play=0.3,
+                  current_limit=4.0)
+    commands = TimeSeries(np.array([0.0, 1.5]), np.array([[0.8, 0.0], [-0.8, 0.0]]),
+                          ('forward', 'yaw'))
+    run = rollout(plant, commands, 1.6, 0.005)
+    crossing = (run.times > 1.504) & (run.times < 1.521)
+    assert np.sum(crossing) == 4
+    np.testing.assert_allclose(run.column('current_left')[crossing], -4.0, atol=0.01)

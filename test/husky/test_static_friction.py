@@ -139,14 +139,16 @@ def reference(speed: float, off: float, end: float) -> np.typing.NDArray[np.floa
     return np.array(seen)
 
 
-def test_it_breaks_away_and_stops_as_its_equations_say(robot: Maker) -> None:
-    speed, off, end = 0.15, 0.5, 1.2
+@pytest.mark.parametrize(('speed', 'error'), [(0.09, 1e-4), (0.15, 1e-4), (0.37, 1e-3)])
+def test_it_breaks_away_and_stops_as_its_equations_say(robot: Maker, speed: float, error: float
+                                                       ) -> None:
+    off, end = 0.5, 1.2
     expected = reference(speed, off, end)
     commands = TimeSeries(np.array([0.0, off]), np.array([[speed, 0.0], [0.0, 0.0]]),
                           ('forward', 'yaw'))
     seen = trajectory(robot('static_friction', break_away_torque=HELD), commands,
                       0.01 * np.arange(1, len(expected) + 1))
-    assert expected[:, 0].max() > 0.7
-    np.testing.assert_allclose(seen.column('wheel_left'), expected[:, 0], atol=1e-4)
-    np.testing.assert_allclose(seen.column('forward'), expected[:, 1], atol=1e-5)
+    assert expected[:, 0].max() > 4.0 * speed
+    np.testing.assert_allclose(seen.column('wheel_left'), expected[:, 0], atol=error)
+    np.testing.assert_allclose(seen.column('forward'), expected[:, 1], atol=0.1 * error)
     assert abs(expected[-1, 0]) < 1e-3

@@ -58,6 +58,14 @@ def test_each_recording_on_its_own_gives_the_same_numbers(
     assert f'{fitted.parameters["command_gain"]:.5g}' in table
 
 
+def test_estimates_are_not_put_into_a_recording(bag: Path,
+                                                capsys: pytest.CaptureFixture[str]) -> None:
+    files = sorted(path.name for path in bag.iterdir())
+    assert run(['identify', str(bag), '--each', '--out', str(bag), '--starts', '1']) == 1
+    assert 'is a recording; choose another folder' in capsys.readouterr().err
+    assert sorted(path.name for path in bag.iterdir()) == files
+
+
 @pytest.mark.parametrize(('arguments', 'message'), [
     (['--out', 'fit.txt'], 'a model file ends in .yaml'),
     (['--out', 'fit.yaml', '--free', 'weight'], "unknown parameter 'weight'"),

@@ -197,10 +197,11 @@ def smoothed(times: FloatArray, values: FloatArray, width: float) -> FloatArray:
     return np.asarray(solveh_banded(bands, values), dtype=np.float64)
 
 
-def _thinned(series: TimeSeries | None) -> TimeSeries | None:
-    # Every n-th reading of a stream that is faster than what tells more.
-    if series is None or len(series) < 4:
-        return series
+def _usable(series: TimeSeries | None) -> TimeSeries | None:
+    # Every n-th reading of a stream that is faster than what tells more; none of one that is too
+    # short to be compared.
+    if series is None or len(series) < 4 or not np.all(np.isfinite(series.values)):
+        return None
     step = float(np.median(np.diff(series.times)))
     stride = max(1, int(np.ceil(1.0 / (max(step, 1e-6) * setting('fastest')) - 1e-6)))
     return TimeSeries(series.times[::stride], series.values[::stride], series.names)
@@ -253,14 +254,14 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
     if 'command' not in streams or segment.duration < setting('shortest_segment'):
         return None
     start = segment.start
-    wheels, imu, pose = (_thinned(streams.get(n)) for n in ('wheels', 'imu', 'pose'))
-    angles = _thinned(streams.get('wheel_angles'))
+    wheels, imu, pose, angles = (_usable(streams.get(n))
+                                 for n in ('wheels', 'imu', 'pose', 'wheel_angles'))
     counted = angles is not None and (
         wheels is None or are_derived(streams['wheels'], streams['wheel_angles']))
     turning = angles if counted else wheels
     pieces: list[tuple[Channel, FloatArray, FloatArray]] = []
     rates: tuple[float, float] | None = None
-    if turning is not None and len(turning) > 3:
+    if turning is not None:
         first = Channel.ANGLE_LEFT if counted else Channel.WHEEL_LEFT
         for offset, side in enumerate(('left', 'right')):
             values = turning.column(side)
@@ -271,10 +272,10 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
             rates = (left, right)
     yaw, forward = 0.0, 0.0
     heading = np.zeros(0)
-    if imu is not None and len(imu) > 3:
+    if imu is not None:
         pieces.append((Channel.YAW_RATE, imu.times, imu.column('yaw_rate')))
         yaw = _early(imu, start, ('yaw_rate',))[0]
-    if pose is not None and len(pose) > 3:
+    if pose is not None:
         raw = np.unwrap(pose.column('heading'))
         heading = smoothed(pose.times, raw, setting('heading_smoothing'))
         pieces += [(Channel.X, pose.times, pose.column('x')),
@@ -290,25 +291,24 @@ def drive_of(segment: Segment, stamped: bool = True) -> Drive | None:
             yaw = yaw if imu is not None else float((heading[late] - heading[0]) / span)
     if not pieces:
         return None
-    pieces = [(c, t, v) for c, t, v in pieces if np.all(np.isfinite(v))]
     pieces.sort(key=lambda piece: int(piece[0]))
     still = at_rest(BodyTwist(forward, yaw), rates) if rates is not None else at_rest(
         BodyTwist(forward, yaw))
     twist = BodyTwist() if still else BodyTwist(forward, yaw)
-    place = Pose() if heading.size == 0 or pose is None else _begun(pose, heading, start, twist)
+    place = Pose() if pose is None else _begun(pose, heading, start, twist)
     begin = (0.0, 0.0)
     if counted and turning is not None:
         left, right = (_first(turning.times, unwrapped(turning.column(side)), start, still)
                        for side in ('left', 'right'))
         begin = (left, right)
-    elif angles is not None and len(angles):
+    elif angles is not None:
         begin = (float(np.interp(start, angles.times, unwrapped(angles.column('left')))),
                  float(np.interp(start, angles.times, unwrapped(angles.column('right')))))
     empty = np.zeros(0)
     return Drive(
         segment.recording, segment.index, start, segment.end, streams['command'],
         empty if turning is None else turning.times, empty if imu is None else imu.times,
-        empty if heading.size == 0 or pose is None else pose.times, counted,
+        empty if pose is None else pose.times, counted,
         np.concatenate([v for _, _, v in pieces]),
         np.concatenate([np.full(t.size, int(c), dtype=np.int64) for c, t, _ in pieces]),
         np.concatenate([t for _, t, _ in pieces]), heading, place,

@@ -217,7 +217,7 @@ class Evidence:
                 rows = self.whiten(raw) / inflation
             weight = student.weights(whitened)
             normal = normal_matrix(rows, weight) + np.diag(point.weights ** 2)
-            slope = rows.T @ (weight * whitened) - point.weights * point.prior_residuals
+            slope = descent_of(rows, whitened, point)
             scale = np.diag(normal) + 1e-12
             before, fell, hoped = cost, False, 1.0
             for _ in range(5):

@@ -42,6 +42,8 @@ class Rows:
 
 #: Drives are copied, and there are many in a long recording: one room for the rows of all.
 _ROWS = Rows()
+#: Threads simulate one drive at several points at once.
+_KEEPING = Lock()
 
 
 class Memory:
@@ -53,15 +55,17 @@ class Memory:
 
     def remembered(self, kind: str, key: Hashable, make: Callable[[], Kept]) -> Kept:
         """Return what was made under a key, among the last of its kind; else make it."""
-        memory = self._made.setdefault(kind, {})
-        if key not in memory:
-            made = make()
+        with _KEEPING:
+            memory = self._made.setdefault(kind, {})
+            if key in memory:
+                found: Kept = memory[key]
+                return found
+        made = make()
+        with _KEEPING:
             while len(memory) >= setting('readings_kept'):
-                memory.pop(next(iter(memory)), None)
+                memory.pop(next(iter(memory)))
             memory[key] = made
-            return made
-        found: Kept = memory.get(key) or make()
-        return found
+        return made
 
     def rows(self, key: Hashable, make: Callable[[], FloatArray]) -> FloatArray:
         """Return the simulated rows of a key if they were among the last ones; else make them."""

@@ -15,11 +15,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from lg_husky_sim.husky.edits.network import (
-    axles,
     Edit,
     EditedNetwork,
     LawRow,
     MOTORS,
+    shaft,
     Stage,
 )
 from lg_husky_sim.husky.effects import Effect
@@ -33,8 +33,7 @@ def _in_series(stage: Stage, describe: Callable[[Effect, str, str, float, str], 
     # The same law at both motors; ``shown`` are numbers that the pack's own voltage shows.
     def apply(network: EditedNetwork, effect: Effect) -> EditedNetwork:
         for number, letter, side, other in MOTORS:
-            axle = dict(axles(network.graph, 'both'))[letter].name
-            row, of = describe(effect, number, other, side, axle)
+            row, of = describe(effect, number, other, side, shaft(network.graph, letter).name)
             row = replace(row, motor=int(number))
             of, meant = _behind_others(network, row, of)
             network = network.with_voltage(effect.id, number, row, of, meant)
@@ -67,30 +66,30 @@ def _behind_others(network: EditedNetwork, row: LawRow, of: tuple[str, ...]
     return tuple(names), meant
 
 
-def _sag(effect: Effect, number: str, other: str, side: float, axle: str) -> _Series:
+def _sag(effect: Effect, number: str, other: str, side: float, rotor: str) -> _Series:
     return LawRow(Law.BUS_SAG, ('bus_resistance', 'supply_voltage')), (
         f'V(V_S{number})', f'V(V_S{other})', f'i(L_{number})', f'i(L_{other})')
 
 
-def _droop(effect: Effect, number: str, other: str, side: float, axle: str) -> _Series:
+def _droop(effect: Effect, number: str, other: str, side: float, rotor: str) -> _Series:
     return LawRow(Law.DROOP, ('droop_rate', 'droop_floor')), (f'V(V_S{number})',)
 
 
-def _current_limit(effect: Effect, number: str, other: str, side: float, axle: str) -> _Series:
+def _current_limit(effect: Effect, number: str, other: str, side: float, rotor: str) -> _Series:
     row = LawRow(Law.CURRENT_LIMIT,
                  ('current_limit', 'motor_resistance', 'torque_constant*gear_ratio'))
-    return row, (f'V(V_S{number})', f'omega({axle})')
+    return row, (f'V(V_S{number})', f'omega({rotor})')
 
 
-def _clip(effect: Effect, number: str, other: str, side: float, axle: str) -> _Series:
+def _clip(effect: Effect, number: str, other: str, side: float, rotor: str) -> _Series:
     return LawRow(Law.CLIP, ('clip_voltage',)), (f'V(V_S{number})',)
 
 
-def _heating(effect: Effect, number: str, other: str, side: float, axle: str) -> _Series:
+def _heating(effect: Effect, number: str, other: str, side: float, rotor: str) -> _Series:
     return LawRow(Law.HEATING, ('heating_rate', 'cooling_time', side)), (f'i(L_{number})',)
 
 
-def _deadband(effect: Effect, number: str, other: str, side: float, axle: str) -> _Series:
+def _deadband(effect: Effect, number: str, other: str, side: float, rotor: str) -> _Series:
     row = {'zone': LawRow(Law.DEAD_ZONE, ('dead_voltage',)),
            'band': LawRow(Law.DEAD_BAND, ('dead_voltage', 'dead_edge')),
            'soft': LawRow(Law.SOFT_BAND, ('dead_voltage',))}[effect.shape]

@@ -181,6 +181,14 @@ def axles(graph: LinearGraph, side: str) -> list[tuple[str, Branch]]:
             for name in (f'J_{letter}W', f'J_R{letter}') if name in names]
 
 
+def shaft(graph: LinearGraph, letter: str) -> Branch:
+    """Return the inertia that turns with the motor of a side."""
+    motor = element_of(graph, f'T_M{letter}')
+    assert isinstance(motor, TwoPort)
+    return next(branch for branch in graph.branches if branch.kind is Kind.A_TYPE
+                and (branch.domain, branch.tail, branch.head) == motor.port2)
+
+
 def scrubbing(graph: LinearGraph) -> Branch:
     """Return the inertia that scrubs over the ground: the base, or what it is tied to there."""
     scrub = branch_of(graph, 'B_H')
