@@ -15,7 +15,7 @@ from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, moved_by
-from lg_husky_sim.diagnosis.hypotheses.waves import wave_numbers, waves
+from lg_husky_sim.diagnosis.hypotheses.waves import pushed, transform, wave_numbers, waves
 from lg_husky_sim.diagnosis.localisation import missing_efforts
 from lg_husky_sim.diagnosis.nameless import left_over, unknown_finding
 from lg_husky_sim.diagnosis.result import Verdict
@@ -93,3 +93,12 @@ def test_waves_are_looked_for_once_and_the_longer_ones_where_there_are_too_many(
     few = wave_numbers(6.0, 0.5, 200)
     assert 150 < len(few) <= 200
     assert np.max(np.hypot(*few.T)) < 1.5
+
+
+def test_waves_of_a_grid_are_pushed_by_as_much_as_one_by_one() -> None:
+    random = np.random.default_rng(3)
+    place, heading = random.uniform(-3.0, 3.0, (40, 2)), random.uniform(-4.0, 4.0, 40)
+    push = random.standard_normal(40)
+    tried = wave_numbers(6.0, 0.5, 10000)
+    assert np.allclose(transform(tried, push, place, heading),
+                       push @ pushed(tried, place, heading), rtol=0.0, atol=1e-9)

@@ -37,6 +37,7 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 #: Samples of each coordinate of the wave number for each independent one.
 DENSITY = 2
@@ -116,6 +117,38 @@ def pushed(waves: FloatArray, place: FloatArray, heading: FloatArray) -> FloatAr
     return found
 
 
+def transform(waves: FloatArray, push: FloatArray, place: FloatArray, heading: FloatArray
+              ) -> NDArray[np.complex128]:
+    """
+    Return the sum of pushes times what :func:`pushed` returns, for waves on a grid.
+
+    Parameters
+    ----------
+    waves : numpy.ndarray, shape (m, 2)
+        Cycles per metre along x and y; ``exp(i k.r)`` is a product of one factor of each.
+    push : numpy.ndarray, shape (n,)
+        Factor of each reading.
+    place : numpy.ndarray, shape (n, 2)
+        [m]
+    heading : numpy.ndarray, shape (n,)
+        [rad]
+
+    Returns
+    -------
+    numpy.ndarray of complex, shape (m,)
+
+    """
+    (xs, across), (ys, up) = (np.unique(waves[:, i], return_inverse=True) for i in range(2))
+    along_x, along_y = (np.exp(2j * np.pi * np.outer(place[:, i], own))
+                        for i, own in enumerate((xs, ys)))
+    way = np.arctan2(waves[:, 1], waves[:, 0])
+    total = np.zeros(len(waves), dtype=complex)
+    for turned, share in ((np.cos(heading), np.cos(way)), (np.sin(heading), np.sin(way))):
+        grid = (along_x * (push * turned)[:, None]).T @ along_y
+        total += share * grid[across, up]
+    return total
+
+
 def levels(power: FloatArray, waves: FloatArray, span: float) -> FloatArray:
     """
     Return the level of the noise at each wave, by its neighbours of about its length.
@@ -191,14 +224,10 @@ def waves(evidence: Evidence, fit: Fit) -> tuple[Wave, ...]:
         w.frame.times.size for w in evidence.whiteners])[:-1])
     pushes = [scores(w, own)[:, row] for w, own in zip(evidence.whiteners, weights, strict=True)]
 
-    def power_of(some: FloatArray) -> FloatArray:
-        total = np.zeros(len(some), dtype=complex)
-        for push, place, one in zip(pushes, places, known, strict=True):
-            total += push @ pushed(some, place, one['heading'])
-        found: FloatArray = np.abs(total) ** 2
-        return found
-    power = np.concatenate(list(evidence.pool.map(
-        power_of, np.array_split(tried, max(1, len(tried) // int(setting('waves_at_once')))))))
+    total = np.zeros(len(tried), dtype=complex)
+    for push, place, one in zip(pushes, places, known, strict=True):
+        total += transform(tried, push, place, one['heading'])
+    power = np.abs(total) ** 2
     independent = math.log(max(len(tried) / DENSITY ** 2, 1.0))
     ratios = power / levels(power, tried, span)
 
