@@ -168,7 +168,9 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
         with suppress(LgHuskyError):
             if whole and best.cost < base.cost + setting('lost'):
                 best = evidence.fit(best.point, rounds=few)
-            return Tried(hypothesis, best, base.cost - best.cost, evidence.count)
+            # Nobody goes on from here by its derivatives, which are as large as all the rest.
+            return Tried(hypothesis, replace(best, slopes=()), base.cost - best.cost,
+                         evidence.count)
     return None
 
 

@@ -342,7 +342,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
         base, kept = eliminated(evidence, plain.point, base, found)
         rounds = _without_the_dropped(rounds, found, kept)
         found = kept
-        plain = plain if found else base
+    # Its innovations are told apart by the frames of the last evidence.
+    plain = evidence.fit(plain.point, plain.slopes) if found else base
     last = rounds[-1]
     beside = last.tried[0].fit if last.small and not found else None
     return Search(plain, base, evidence, tuple(rounds), tuple(found), beside)
