@@ -229,9 +229,11 @@ def _regimes(drive: Drive, times: FloatArray) -> dict[str, np.typing.NDArray[np.
     series = drive.commands
     forward_all, yaw_all = series.column('forward'), series.column('yaw')
     at = np.maximum(np.searchsorted(series.times, times, side='right') - 1, 0)
-    before = np.maximum(np.searchsorted(series.times, times - 0.4, side='right') - 1, 0)
+    span = setting('changing_span')
+    before = np.maximum(np.searchsorted(series.times, times - span, side='right') - 1, 0)
     forward, yaw = forward_all[at], yaw_all[at]
-    change = (np.abs(forward - forward_all[before]) + 0.3 * np.abs(yaw - yaw_all[before])) / 0.4
+    change = (np.abs(forward - forward_all[before])
+              + setting('changing_lever') * np.abs(yaw - yaw_all[before])) / span
     still, turning = setting('still_speed'), np.abs(yaw) > setting('turning_rate')
     moving = (np.abs(forward) > still) | (np.abs(yaw) > still)
     changing = change > setting('changing_speed')

@@ -209,14 +209,15 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     if chance > setting('hopeless'):
         return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     own = evidence.renoised(tried[0].fit)
-    for number in range(2):
+    for number in range(int(setting('noise_turns'))):
         best = tried[0]
         evidence = own if number == 0 else evidence.renoised(best.fit)
         points = [base.point] + ([nominal] if nominal is not None else [])
         base = min((evidence.fit(with_jitter(p, evidence), base.slopes) for p in points),
                    key=lambda f: f.cost)
         seen = _looks(evidence, base, pool, [t.hypothesis.effect for t in tried])
-        known = [Look(t.hypothesis, numbers_of(t), math.inf) for t in tried[:3]]
+        known = [Look(t.hypothesis, numbers_of(t), math.inf)
+                 for t in tried[:int(setting('known_best'))]]
         once = {one.hypothesis.label: one for one in reversed(known)}
         chosen = [one for one in seen[:few] if one.hypothesis.label not in once]
         guide = replace(base.point, places=best.fit.point.places[:base.point.places.size])
@@ -225,7 +226,9 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         if not tried or tried[0].hypothesis.effect == best.hypothesis.effect:
             break
     ranking = replace(ranking, evidence=evidence, base=base)
-    tried = ranking.ordered([*(_best_form(evidence, base, t) for t in tried[:2]), *tried[2:]])
+    first = int(setting('fitted_whole'))
+    tried = ranking.ordered([*(_best_form(evidence, base, t) for t in tried[:first]),
+                             *tried[first:]])
     tried = _from_the_start(evidence, base, tried)
     chance, real = ranking.chance(tried[0]), likely_real(tried[0].gain, evidence.count)
     beyond = is_beyond_chance(chance)
