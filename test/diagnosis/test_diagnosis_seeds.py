@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.evidence.reading import Reading, WheelReading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
 from lg_husky_sim.diagnosis.selection import search as searching
-from lg_husky_sim.diagnosis.selection.conventions import best_reading
+from lg_husky_sim.diagnosis.selection.conventions import best_reading, wheel_reading
 from lg_husky_sim.diagnosis.selection.recalibration import Logged
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted
 from lg_husky_sim.diagnosis.selection.screening import look
@@ -100,9 +100,9 @@ def test_each_early_effect_is_read_anew(
     made: dict[int, Fit] = {}
 
     def once(evidence: Evidence, fit: Fit) -> Fit:
-        made[id(fit)] = made.get(id(fit)) or best_reading(evidence, fit)
+        made[id(fit)] = made.get(id(fit)) or wheel_reading(evidence, fit)
         return made[id(fit)]
-    monkeypatch.setattr(searching, 'best_reading', once)
+    monkeypatch.setattr(searching, 'wheel_reading', once)
     plant = _with_loop({'loop_lag': 0.45, 'loop_gain': 2.0, 'loop_integral': 10.0})
     first, start = _begun(record('loop', plant, steps, 1), threads)
     rough = first.fit(start, rounds=1)

@@ -51,9 +51,18 @@ def best_reading(evidence: Evidence, fit: Fit, afresh: bool = False) -> Fit:
         With that reading, under the same noise; the given one where none is better.
 
     """
-    chosen = _better(evidence, fit, _wheel_options, afresh)
-    # The windows of a gyro are short against what it follows: a step tells what they gain.
-    return _better(evidence, chosen, _imu_options, least=setting('least_reading'))
+    return gyro_reading(evidence, wheel_reading(evidence, fit, afresh))
+
+
+def wheel_reading(evidence: Evidence, fit: Fit, afresh: bool = False) -> Fit:
+    """Choose how the wheels are read, as :func:`best_reading` does."""
+    return _better(evidence, fit, _wheel_options, afresh)
+
+
+def gyro_reading(evidence: Evidence, fit: Fit) -> Fit:
+    """Choose how the gyro is read, as :func:`best_reading` does."""
+    # Its windows are short against what it follows: a step tells what they gain.
+    return _better(evidence, fit, _imu_options, least=setting('least_reading'))
 
 
 def _better(evidence: Evidence, fit: Fit, options_of: Callable[[

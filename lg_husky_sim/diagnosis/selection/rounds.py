@@ -168,9 +168,7 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
         with suppress(LgHuskyError):
             if whole and best.cost < base.cost + setting('lost'):
                 best = evidence.fit(best.point, rounds=few)
-            # Nobody goes on from here by its derivatives, which are as large as all the rest.
-            return Tried(hypothesis, replace(best, slopes=()), base.cost - best.cost,
-                         evidence.count)
+            return Tried(hypothesis, best, base.cost - best.cost, evidence.count)
     return None
 
 
@@ -207,7 +205,7 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     tried = sorted([*tried, *seeds], key=lambda t: -t.score)
     chance = ranking.rough_chance(tried[0]) if tried else 1.0
     if chance > setting('hopeless'):
-        return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
+        return Round(evidence, base, _kept(tried), False, chance, tuple(seen))
     own = evidence.renoised(tried[0].fit)
     for number in range(int(setting('noise_turns'))):
         best = tried[0]
@@ -233,8 +231,13 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     chance, real = ranking.chance(tried[0]), likely_real(tried[0].gain, evidence.count)
     beyond = is_beyond_chance(chance)
     small = beyond and not is_rather_real(tried[0].gain, evidence.count)
-    return Round(evidence, base, tuple(tried), beyond and not small,
+    return Round(evidence, base, _kept(tried), beyond and not small,
                  1.0 - real if small else chance, tuple(seen), small)
+
+
+def _kept(tried: Sequence[Tried]) -> tuple[Tried, ...]:
+    # Only from the first one a fit goes on: derivatives are as large as all the rest of it.
+    return (*tried[:1], *(replace(one, fit=replace(one.fit, slopes=())) for one in tried[1:]))
 
 
 def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:

@@ -20,7 +20,11 @@ from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     Numbers,
     with_effects,
 )
-from lg_husky_sim.diagnosis.selection.conventions import best_reading
+from lg_husky_sim.diagnosis.selection.conventions import (
+    best_reading,
+    gyro_reading,
+    wheel_reading,
+)
 from lg_husky_sim.diagnosis.selection.elimination import eliminated
 from lg_husky_sim.diagnosis.selection.exchange import exchanged
 from lg_husky_sim.diagnosis.selection.laws import Laws
@@ -141,9 +145,14 @@ def _best_start(evidence: Evidence, base: Fit, begins: Sequence[tuple[
     left = evidence.residuals(evidence.predict(base.point.at(begins[0][1]))) if begins else 0.0
     inflation = max(1.0, float(np.sqrt(np.mean(np.square(left)))))
 
-    def fitted_from(start: tuple[Hypothesis, Point], rounds: int, wider: float) -> Fit | None:
+    def fitted_from(start: tuple[Hypothesis, Point], rounds: int, wider: float,
+                    slopes: bool = False) -> Fit | None:
+        own = range(len(base.point.unknowns), len(start[1].unknowns))
+        known = [np.hstack([one, np.zeros((one.shape[0], len(own)))])
+                 for one in base.slopes] if slopes else None
         try:
-            return evidence.fit(start[1], rounds=rounds, inflation=wider)
+            return evidence.fit(start[1], known, rounds=rounds, renew=own if slopes else None,
+                                inflation=wider)
         except LgHuskyError:
             # It runs away from there.
             return None
@@ -152,7 +161,7 @@ def _best_start(evidence: Evidence, base: Fit, begins: Sequence[tuple[
         rough = fitted_from(start, few, inflation)
         return rough and fitted_from((start[0], rough.point), int(setting('seed_rounds')), 1.0)
     few = int(setting('seed_start'))
-    begun = evidence.pool.map(lambda start: fitted_from(start, few, inflation), starts)
+    begun = evidence.pool.map(lambda start: fitted_from(start, few, inflation, True), starts)
     ahead = sorted(((start[0], fit) for start, fit in zip(starts, begun, strict=True) if fit),
                    key=lambda one: one[1].cost)[:int(setting('seeds_finished'))]
     ends = evidence.pool.map(goes_on, [(one, fit.point) for one, fit in ahead])
@@ -184,10 +193,12 @@ def read_anew(evidence: Evidence, base: Fit, early: Sequence[Tried]
         None where there are no effects.
 
     """
-    read = [(best_reading(evidence, one.fit), one.hypothesis) for one in early]
+    read = [(wheel_reading(evidence, one.fit), one.hypothesis) for one in early]
     if not read:
         return None
     fit, hypothesis = min(read, key=lambda one: one[0].cost)
+    # Gyros are followed far less far by what they smooth.
+    fit = gyro_reading(evidence, fit)
     return evidence, hypothesis, with_effects(base.point, fit.point, [hypothesis])
 
 
