@@ -272,7 +272,8 @@ def follow(s: FloatArray, stamps: FloatArray, values: FloatArray, times: FloatAr
             if error > 1.0 and h > 1.5 * SHORTEST:
                 h = max(SHORTEST, h * max(0.2, min(0.5, share)))
                 continue
-            growth = max(0.3, min(3.0, share))
+            # Nothing is known of the error of a step that found no efforts, and none is shorter.
+            growth = max(0.3, min(3.0, share)) if error >= 0.0 else 1.0
             if before == 0.0:
                 opening, opened = h, error
         steps += 1
