@@ -28,7 +28,7 @@ def levelled(scores: FloatArray, speeds: FloatArray) -> FloatArray:
     Parameters
     ----------
     scores : numpy.ndarray, shape (n,)
-        In any unit; their mean square may depend on the speed.
+        In any unit; their mean square may depend on the speed. Those of nothing tell nothing.
     speeds : numpy.ndarray, shape (n,)
         Of the robot, in any unit.
 
@@ -38,12 +38,18 @@ def levelled(scores: FloatArray, speeds: FloatArray) -> FloatArray:
         Of a mean square of one in each of some groups of like speed.
 
     """
-    found = np.array(scores)
+    found = np.where(_tells(scores), scores, 0.0)
     count = max(1, min(int(setting('burst_speeds')), scores.size // int(setting('burst_least'))))
     for group in np.array_split(np.argsort(speeds, kind='stable'), count):
-        if group.size and np.any(scores[group]):
-            found[group] /= np.sqrt(np.mean(scores[group] ** 2))
+        own = found[group]
+        if np.any(own):
+            found[group] = own / np.sqrt(np.mean(own[own != 0.0] ** 2))
     return found
+
+
+def _tells(scores: FloatArray) -> np.typing.NDArray[np.bool_]:
+    # Where there is a score: an effort that no sensor sees has none, or one of zero.
+    return np.asarray(np.isfinite(scores) & (scores != 0.0), dtype=np.bool_)
 
 
 def burst_evidence(scores: FloatArray) -> float:
@@ -54,7 +60,7 @@ def burst_evidence(scores: FloatArray) -> float:
     ----------
     scores : numpy.ndarray, shape (n,)
         In the order of time. The strongest one and its neighbours are left out: what happens
-        once is an accident of a log more often than physics.
+        once is an accident of a log more often than physics. Those of nothing tell nothing.
 
     Returns
     -------
@@ -62,6 +68,7 @@ def burst_evidence(scores: FloatArray) -> float:
         [nats]
 
     """
+    scores = scores[_tells(scores)]
     strongest = int(np.argmax(np.abs(scores))) if scores.size else 0
     reach = int(setting('burst_reach'))
     squares = np.delete(scores, np.arange(
@@ -72,16 +79,16 @@ def burst_evidence(scores: FloatArray) -> float:
     single = -0.5 * float(np.sum(squares / usual + np.log(usual)))
     share = setting('burst_share')
     large = float(np.mean(np.sort(squares)[-max(1, int(share * squares.size)):]))
-    small = float(np.median(squares))
     least = 1e-6 * usual
+    small = max(float(np.median(squares)), least)
     before = -np.inf
     while True:
         quiet = np.log1p(-share) - 0.5 * (squares / small + np.log(small))
         burst = np.log(share) - 0.5 * (squares / large + np.log(large))
         both = np.logaddexp(quiet, burst)
         found = float(np.sum(both))
-        if found < before + setting('fit_converged'):
-            return max(found, before) - single - float(np.log(squares.size))
+        if not found >= before + setting('fit_converged'):
+            return (found if found > before else before) - single - float(np.log(squares.size))
         before, part = found, np.exp(burst - both)
         share = float(np.clip(np.mean(part), 1.0 / squares.size, 0.5))
         small = max(float(np.sum((1.0 - part) * squares) / np.sum(1.0 - part)), least)
