@@ -74,9 +74,13 @@ def slow_model(plant: Plant, mass: float, yaw_inertia: float, inertias: Mapping[
     a_ff = one.a[np.ix_(fast, fast)]
     inputs = np.hstack([inputs, one.b])
     follow = -_in_balance(a_ff) @ np.hstack([one.a[np.ix_(fast, slow)], inputs[fast]])
+    by_itself = np.hstack([one.a[np.ix_(slow, slow)], inputs[slow]])
     a_sf = one.a[np.ix_(slow, fast)]
-    a_slow = one.a[np.ix_(slow, slow)] + a_sf @ follow[:, :2]
-    e_slow = inputs[slow] + a_sf @ follow[:, 2:]
+    both = by_itself + a_sf @ follow
+    # What sides that are alike do to each other's balance cancels, but for rounding.
+    parts = np.abs(by_itself) + np.abs(a_sf) @ np.abs(follow)
+    both = np.where(np.abs(both) > setting('cancelled') * parts, both, 0.0)
+    a_slow, e_slow = both[:, :2], both[:, 2:]
     wheels = one.rows[:2, fast] @ follow
     wheels[:, 6:] += one.rows_u[:2]
     wheels[:, :2] += one.rows[:2, slow]
