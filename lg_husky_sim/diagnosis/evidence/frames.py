@@ -80,7 +80,8 @@ def frame_of(drive: Drive, plant: Plant, motion: Motion, predicted: FloatArray,
         if part.stop - part.start > 3:
             slopes[part] = _slopes(drive.times[part], predicted[part])
     kicks = np.vstack([_lost_commands(drive, motion), _steps(drive, plant, reading, reach)])
-    kicks = kicks[np.argsort(kicks[:, 0], kind='stable')]
+    # In the order in which they have come for sure: one that is at its time waits for no other.
+    kicks = kicks[np.argsort(kicks[:, 0] + kicks[:, 5], kind='stable')]
     order = np.argsort(times, kind='stable')
     return Frame(drive, times, order, np.cos(heading), np.sin(heading), slopes, kicks)
 

@@ -179,10 +179,10 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
     longest : float
         Longest step of a propagation [s].
     kicks : numpy.ndarray, shape (n_kicks, 6)
-        Times [s], in order, at which the torques on the left and right wheels become uncertain
-        by so much more [(N·m)²], and steps of the voltages there [V]: a step that comes by s
-        later leaves s times what the voltages accelerate and how fast they turn the wheels. Last
-        how far from its time a step may come [s]: readings in this time tell nothing of it.
+        Times [s] at which the torques on the left and right wheels become uncertain by so much
+        more [(N·m)²], and steps of the voltages there [V]: a step that comes by s later leaves s
+        times what the voltages accelerate and how fast they turn the wheels. Last how far from
+        its time it may come [s], their sum in order: readings in this time tell nothing of it.
     gain, scale : numpy.ndarray, shapes (n, 12), (n,)
         Receive the gains and the standard deviations of the innovations, in the order of time.
 
@@ -194,8 +194,8 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
     column = seen.reshape(12, 1)
     late, moved, of_late = np.zeros(4), (4, 5, 10, 11), (-1, 2, 6, 7)
     force_time, moment_time, drive_time = process[3], process[4], process[5]
-    now = times[order[0]]
-    kick = 0
+    now, kick = times[order[0]], 0
+    furthest = np.max(kicks[:, 5]) if kicks.shape[0] else 0.0
     while kick < kicks.shape[0] and kicks[kick, 0] < now:
         kick += 1
     for k in range(order.size):
@@ -235,12 +235,12 @@ def gains(times: FloatArray, channels: Integers, order: Integers, noise: FloatAr
         _read_all(p, 12, channel, model, seen)
         unsure = noise[reading]
         near = kick
-        while near < kicks.shape[0] and kicks[near, 0] - kicks[near, 5] <= now:
+        while near < kicks.shape[0] and kicks[near, 0] + kicks[near, 5] - 2.0 * furthest <= now:
             # Of times that are evenly spread over the reach, what one of them has done by now
             # has 4 r^3 - 3 r^4 of the variance that it leaves at the end, r of the reach over.
             over = 0.0
             if kicks[near, 5] > 0.0:
-                over = (now - kicks[near, 0] + kicks[near, 5]) / (2.0 * kicks[near, 5])
+                over = max(0.0, now - kicks[near, 0] + kicks[near, 5]) / (2.0 * kicks[near, 5])
             spread = 4.0 * over ** 3 - 3.0 * over ** 4
             for i in range(4):
                 if channel == of_late[i]:
