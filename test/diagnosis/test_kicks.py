@@ -77,3 +77,20 @@ def test_a_step_may_have_come_though_a_command_before_it_is_not_lost_yet(
     sure[:, 1:3] = 0.0
     np.testing.assert_array_equal(spread(gapped, frame, sure),
                                   spread(gapped, frame, frame.kicks[~lost]))
+
+
+@pytest.mark.parametrize(('latency', 'delay'), [(0.0, 0.08), (0.08, 0.0)])
+def test_a_lost_command_is_missed_when_it_would_have_acted(
+        gapped: Evidence, robot: Callable[..., Plant], latency: float, delay: float) -> None:
+    """Not when it would have been logged: the base has not missed anything by then."""
+    drive, late = gapped.drives[0], latency + delay
+    plant = robot('command_latency', latency=latency) if latency else robot()
+    frame = framed(drive, plant, Reading(values={'command_delay': delay}), 0.001)
+    kicks = frame.kicks[frame.kicks[:, 5] == 0.0]
+    usual = float(np.median(np.diff(drive.commands.times)))
+    before = drive.commands.times[np.flatnonzero(np.diff(drive.commands.times) > 1.5 * usual)]
+    np.testing.assert_allclose(kicks[::2, 0], before + 0.5 * usual + late, atol=1e-9)
+    # By what the wheels do then, too: as much as without a delay.
+    early = framed(drive, robot(), Reading(), 0.001).kicks
+    np.testing.assert_allclose(kicks[:, 1:3], early[early[:, 5] == 0.0][:, 1:3], rtol=0.1,
+                               atol=1e-3)

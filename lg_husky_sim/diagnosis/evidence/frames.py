@@ -79,7 +79,8 @@ def frame_of(drive: Drive, plant: Plant, motion: Motion, predicted: FloatArray,
         part = drive.slice_of(channel)
         if part.stop - part.start > 3:
             slopes[part] = _slopes(drive.times[part], predicted[part])
-    kicks = np.vstack([_lost_commands(drive, motion), _steps(drive, plant, reading, reach)])
+    late = command_lag(drive, reading) + plant.sets[0].command.latency
+    kicks = np.vstack([_lost_commands(drive, motion, late), _steps(drive, plant, late, reach)])
     # In the order in which they have come for sure: one that is at its time waits for no other.
     kicks = kicks[np.argsort(kicks[:, 0] + kicks[:, 5], kind='stable')]
     order = np.argsort(times, kind='stable')
@@ -96,9 +97,9 @@ def _slopes(times: FloatArray, values: FloatArray) -> FloatArray:
     return slopes
 
 
-def _lost_commands(drive: Drive, motion: Motion) -> FloatArray:
-    # Where a command seems lost: when it would have come and when the next one came, with half
-    # of the step of the wheels' rates, squared.
+def _lost_commands(drive: Drive, motion: Motion, late: float) -> FloatArray:
+    # Where a command seems lost: when it would have acted and when the next one did, so late,
+    # with half of the step of the wheels' rates, squared.
     stamps = drive.commands.times
     found = []
     if stamps.size > 3:
@@ -106,7 +107,7 @@ def _lost_commands(drive: Drive, motion: Motion) -> FloatArray:
         usual = float(np.median(gaps))
         for place in np.flatnonzero((gaps > setting('lost_gap') * usual)
                                     & (gaps < setting('pause') * usual)):
-            begin, end = stamps[place] + 0.5 * usual, stamps[place + 1]
+            begin, end = stamps[place] + 0.5 * usual + late, stamps[place + 1] + late
             steps = []
             for side in ('left', 'right'):
                 before, after = np.interp([begin, end + usual], probe_times(drive),
@@ -116,7 +117,7 @@ def _lost_commands(drive: Drive, motion: Motion) -> FloatArray:
     return np.array(found).reshape(-1, 6)
 
 
-def _steps(drive: Drive, plant: Plant, reading: Reading, reach: float) -> FloatArray:
+def _steps(drive: Drive, plant: Plant, late: float, reach: float) -> FloatArray:
     # Steps of the voltages at the commands, where the command stage puts them.
     stage = plant.sets[0].command
     values = drive.commands.values
@@ -126,7 +127,7 @@ def _steps(drive: Drive, plant: Plant, reading: Reading, reach: float) -> FloatA
         values[:, 0], -stage.limit_forward, stage.limit_forward)
     turn = stage.volts_per_rate * np.clip(values[:, 1], -stage.limit_yaw, stage.limit_yaw)
     steps = np.diff(np.column_stack([forward - turn, forward + turn]), axis=0)
-    times = drive.commands.times[1:] + command_lag(drive, reading) + stage.latency
+    times = drive.commands.times[1:] + late
     moved = np.any(steps != 0.0, axis=1)
     return np.column_stack([times, np.zeros((times.size, 2)), steps,
                             np.full(times.size, reach)])[moved]
