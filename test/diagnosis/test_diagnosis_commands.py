@@ -12,6 +12,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
 from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
+from lg_husky_sim.diagnosis.evidence.repaired_commands import repaired
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.log_notes import log_notes
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
@@ -114,6 +115,27 @@ def test_a_robot_that_hears_everything_keeps_all_its_commands() -> None:
     assert evidence.drives[0].commands is evidence.drives[0].logged
     assert log_notes(evidence.drives) == ()
     assert evidence.noise.values['command_jitter'] < 0.001
+
+
+@pytest.mark.parametrize(('missed', 'late', 'taken'), [
+    (12.0, 7.0, 'late'), (8.0, 7.0, 'missed'), (0.0, 7.0, 'missed'), (40.0, 7.0, 'late')])
+def test_a_command_has_its_likeliest_explanation_and_not_the_first(
+        missed: float, late: float, taken: str) -> None:
+    """What has a number must be likelier by more than such a number gains by chance."""
+    times = np.linspace(0.0, 3.9, 40)
+    logged = TimeSeries(times, np.column_stack([np.sin(times), np.cos(times)]),
+                        ('forward', 'yaw'))
+    far = np.zeros(400)
+    far[200:203] = 40.0
+
+    def score(commands: TimeSeries) -> FloatArray:
+        # One of them later, or one less.
+        e = np.array(far)
+        e[200:203] = missed if np.all(np.isin(commands.times, times)) else late
+        return e
+    found = repaired(logged, far, np.ones(400, dtype=bool), np.linspace(0.0, 4.0, 400), score)
+    assert found is not logged
+    assert np.all(np.isin(found.times, times)) == (taken == 'missed')
 
 
 def rounding_of(values: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+import math
 
 from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.settings import setting
@@ -23,7 +24,8 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
 
     Where the wheels leave a simulation by far more than noise, a command is taken out, acts later,
     or is put into a gap between those before and after it, if that makes the drive likelier by a
-    stated gain. Of few commands only: up to a stated share.
+    stated gain: whichever does most, less what its numbers cost, which are half of the logarithm
+    of the number of readings each. Of few commands only: up to a stated share.
 
     Parameters
     ----------
@@ -59,10 +61,12 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
             if place in tried:
                 continue
             tried.add(place)
-            for other, innovations in _others(best, float(stamps[place]), score):
-                if cost - student.cost(innovations) > setting('missed_gain'):
-                    found, e, cost = other, innovations, student.cost(innovations)
-            if found is not None:
+            ways = [(student.cost(innovations), numbers, other, innovations) for (
+                numbers, other, innovations) in _others(best, float(stamps[place]), score)]
+            likelier = [way for way in ways if cost - way[0] > setting('missed_gain')]
+            if likelier:
+                cost, _, found, e = min(likelier, key=lambda way: (
+                    way[0] + 0.5 * way[1] * math.log(whitened.size)))
                 break
         if found is None:
             break
@@ -83,18 +87,19 @@ def _suspects(times: FloatArray, sizes: FloatArray, stamps: FloatArray) -> list[
 
 
 def _others(commands: TimeSeries, stamp: float, score: Score
-            ) -> Iterator[tuple[TimeSeries, FloatArray]]:
-    # Without the command at a stamp, with it late, and with one in the middle of the gap after it.
+            ) -> Iterator[tuple[int, TimeSeries, FloatArray]]:
+    # Without the command at a stamp, with it late, and with one in the middle of the gap after it,
+    # each behind how many numbers were fitted.
     place = int(np.argmin(np.abs(commands.times - stamp)))
     keep = np.arange(commands.times.size) != place
     without = TimeSeries(commands.times[keep], commands.values[keep], commands.names)
-    yield without, score(without)
+    yield 0, without, score(without)
     gaps = np.diff(commands.times)
     usual = float(np.median(gaps))
-    yield _held(commands, place, usual, score)
+    yield 1, *_held(commands, place, usual, score)
     if place < gaps.size and setting('lost_gap') * usual < gaps[place] < (
             setting('pause') * usual):
-        yield _filled(commands, place, round(float(gaps[place]) / usual) - 1, score)
+        yield 2, *_filled(commands, place, round(float(gaps[place]) / usual) - 1, score)
 
 
 def _held(commands: TimeSeries, place: int, usual: float, score: Score
