@@ -32,16 +32,25 @@ from numpy.typing import NDArray
 
 
 def onsets_of(evidence: Evidence) -> list[Onset]:
-    """Return where an effect may begin, on a coarse grid of times and places."""
+    """
+    Return where an effect may begin, on a coarse grid of times and places.
+
+    A recording is driven on after each of its segments but the last, and all but the first one
+    follow others: there is no edge there.
+    """
     found = []
     spacing, edge = setting('onset_spacing'), setting('onset_edge')
-    names = list(evidence.names)
-    last = {d.recording: d.end for d in evidence.drives}
+    whole: dict[str, tuple[float, float]] = {}
     for drive in evidence.drives:
-        first = drive.start + (edge if names.index(drive.recording) == 0 else 0.0)
-        times = np.arange(first, drive.end - edge, spacing)
-        found += [Onset(OnsetKind.TIME, float(t), drive.recording) for t in times
-                  if t < last[drive.recording]]
+        begin, end = whole.get(drive.recording, (np.inf, -np.inf))
+        whole[drive.recording] = min(begin, drive.start), max(end, drive.end)
+    for drive in evidence.drives:
+        name, begin, end = drive.recording, drive.start, drive.end
+        if name == evidence.names[0] and begin == whole[name][0]:
+            begin += edge
+        if end == whole[name][1]:
+            end -= edge
+        found += [Onset(OnsetKind.TIME, float(t), name) for t in np.arange(begin, end, spacing)]
     x = np.concatenate([d.measured[d.slice_of(Channel.X)] for d in evidence.drives])
     if x.size:
         low, high = np.quantile(x, [0.0, 1.0])
