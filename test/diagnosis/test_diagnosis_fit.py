@@ -19,7 +19,7 @@ from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses, Hypothesis
 from lg_husky_sim.diagnosis.selection.rounds import attempt, calibrated, forward_step, with_jitter
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -109,6 +109,37 @@ def test_derivatives_are_those_of_one_number_after_the_other(
                 continue
             np.testing.assert_array_equal(found[:, column], expected,
                                           start.unknowns[k].name)
+
+
+@pytest.mark.parametrize('kind', [OnsetKind.PLACE_ABOVE, OnsetKind.TIME])
+def test_the_delay_of_a_pose_that_tells_of_a_place_moves_the_readings_of_all_sensors(
+        kind: OnsetKind, drive: Callable[..., Recording]) -> None:
+    drives = drives_of([drive('ahead', 'nothing', 1)])
+    (own,), model = drives, load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    x = own.measured[own.slice_of(Channel.X)]
+    onset = Onset(OnsetKind.TIME, own.start + 6.3, 'ahead') if kind is OnsetKind.TIME else Onset(
+        kind, float(x[0] + 0.6 * (np.max(x) - x[0])))
+    sizes = {'pull_moment': 6.0}
+    point = Hypothesis(Effect('yaw_pull'), (sizes,)).at(onset).point(start, sizes)
+    which = [k for k, u in enumerate(point.unknowns) if u.name in (
+        'delay_wheels', 'delay_imu', 'delay_pose')]
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        predicted = evidence.predict(point)
+        found = evidence.derivatives(point, predicted, which)[0]
+        for column, k in enumerate(which):
+            moved = np.array(point.places)
+            moved[k] += point.unknowns[k].step
+            expected = (evidence.predict(point.at(moved))[0] - predicted[0]
+                        ) / point.unknowns[k].step
+            # To the error of a simulation of which other times are asked.
+            np.testing.assert_allclose(found[:, column], expected, rtol=0.0, atol=1e-5,
+                                       err_msg=point.unknowns[k].name)
+            beside = expected[own.slice_of(Channel.YAW_RATE)]
+            if point.unknowns[k].name == 'delay_pose':
+                assert np.any(beside) == (kind is not OnsetKind.TIME)
 
 
 @pytest.mark.parametrize(('effect', 'number', 'delay', 'stream'), [

@@ -3,10 +3,11 @@
 """
 Derivatives of predicted readings by the unknowns, by finite differences of simulations.
 
-Numbers of the log that move readings of different sensors share a simulation. Of what commands and
-readings are late only the sum counts: derivatives by lags of the commands are the sums of those by
-the delays of the sensors, and derivatives by effects that are such delays are those by them, since
-finite differences would tell them apart by their errors.
+Numbers of the log that move readings of different sensors share a simulation, but for the delay
+of a pose that tells when the robot was beyond a place where an effect acts: it moves them all. Of
+what commands and readings are late only the sum counts: derivatives by lags of the commands are
+the sums of those by the delays of the sensors, and derivatives by effects that are such delays are
+those by them, since finite differences would tell them apart by their errors.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 import itertools
 
 from lg_husky_sim.diagnosis.evidence.drives import Drive
+from lg_husky_sim.diagnosis.evidence.measured_place import is_measured
 from lg_husky_sim.diagnosis.evidence.observation import APART, moved_by
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.signals import FloatArray
@@ -65,8 +67,11 @@ class Differences:
         lags = acting.keys() & {*which, *alike.values()}
         delays = [names[name] for name in APART[0] if name in names]
         wanted = {*which, *alike.values()}.difference(alike, lags).union(delays if lags else ())
+        onset = point.structure.onset
+        acting_by = {'delay_pose'} if any(is_measured(d, onset) for d in self.drives) else set()
         together = [own for row in APART if len(own := [
-            names[name] for name in row if names.get(name) in wanted]) > 1]
+            names[name] for name in row
+            if names.get(name) in wanted and name not in acting_by]) > 1]
         alone = wanted.difference(*together)
         made = dict(itertools.chain.from_iterable(self.pool.map(
             lambda ks: self._quotients(point, predicted, ks),
