@@ -44,8 +44,13 @@ def acts_at(drive: Drive, onset: Onset, times: FloatArray, delay: float
     numpy.ndarray of bool, shape (n,)
 
     """
+    return acts(onset, times, measured_x(drive, times, delay))
+
+
+def measured_x(drive: Drive, times: FloatArray, delay: float) -> FloatArray:
+    """Return where a drive with a pose was at times [s], its stamps so late [s]."""
     x = drive.measured[drive.slice_of(Channel.X)]
-    return acts(onset, times, np.interp(times, drive.pose_times - delay, x))
+    return np.asarray(np.interp(times, drive.pose_times - delay, x), dtype=np.float64)
 
 
 def legs_of(drive: Drive, onset: Onset, delay: float) -> list[tuple[float, bool]]:

@@ -12,17 +12,24 @@ that of an angle a is ``a - T y``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
 import math
 
+from lg_husky_sim.diagnosis.evidence.chained_places import chained
+from lg_husky_sim.diagnosis.evidence.counted_angles import counted, shares
 from lg_husky_sim.diagnosis.evidence.drives import Channel, Drive
 from lg_husky_sim.diagnosis.evidence.low_pass import followed_by_message, low_passed
-from lg_husky_sim.diagnosis.evidence.measured_place import acts_at, is_measured, legs_of
+from lg_husky_sim.diagnosis.evidence.measured_place import (
+    acts_at,
+    is_measured,
+    legs_of,
+    measured_x,
+)
 from lg_husky_sim.diagnosis.evidence.reading import Reading, smoothing_share, WheelReading
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.plant import Plant, SensorModel
+from lg_husky_sim.husky.plant import Plant, PlantSet, SensorModel
 from lg_husky_sim.signals import FloatArray, TimeSeries
 from lg_husky_sim.simulation.events import COLUMNS, Events, Propagator
 from lg_husky_sim.simulation.starting import commanded_until
@@ -105,6 +112,13 @@ class Motion:
         if onset is not None and is_measured(self.drive, onset):
             return acts_at(self.drive, onset, self.times, self.delay)
         return self.plant.late(self.times, self.rows[:, _COLUMN['x']])
+
+    def shares(self, part: str) -> FloatArray:
+        """Return for how much of the time since the one before it acts, of some of the times."""
+        times, onset = self.times[self.wanted.parts[part]], self.plant.onset
+        return np.zeros(times.size) if onset is None else shares(onset, times, measured_x(
+            self.drive, times, self.delay) if is_measured(self.drive, onset) else self.column(
+                'x', part))
 
 
 def probe_times(drive: Drive) -> FloatArray:
@@ -332,11 +346,11 @@ def observe(motion: Motion, drive: Drive, reading: Reading) -> FloatArray:
     """
     sets = motion.plant.sets
     if len(sets) == 1 or sets[0].sensors == sets[1].sensors:
-        return _observed(motion, drive, reading, sets[-1].sensors)
+        return _observed(motion, drive, reading, sets[-1].sensors, sets[-1:])
     # A sensor that changes during a drive: read both ways, each with its own delays.
-    late = _observed(motion, drive, reading, sets[1].sensors)
+    late = _observed(motion, drive, reading, sets[1].sensors, sets)
     before = replace(motion.plant, sets=(sets[0], replace(sets[1], sensors=sets[0].sensors)))
-    early = _observed(simulate(before, drive, reading), drive, reading, sets[0].sensors)
+    early = _observed(simulate(before, drive, reading), drive, reading, sets[0].sensors, sets)
     return np.where(_on(motion, drive), late, early)
 
 
@@ -346,16 +360,18 @@ def _on(motion: Motion, drive: Drive) -> np.typing.NDArray[np.bool_]:
     return np.asarray(at > 0.5, dtype=np.bool_)
 
 
-def _observed(motion: Motion, drive: Drive, reading: Reading, sensors: SensorModel
-              ) -> FloatArray:
+def _observed(motion: Motion, drive: Drive, reading: Reading, sensors: SensorModel,
+              sets: Sequence[PlantSet]) -> FloatArray:
+    # As sensors read it; encoders count on by the factors of all sets, whatever they read now.
     out = np.empty(drive.measured.size)
     if drive.wheel_times.size:
         for offset, side in enumerate(('left', 'right')):
             factor = sensors.encoder_left if side == 'left' else sensors.encoder_right
             if drive.counted:
-                begin = drive.wheel_angles[offset]
-                out[drive.slice_of(Channel(Channel.ANGLE_LEFT + offset))] = (
-                    begin + factor * (motion.column(f'angle_{side}', 'wheels') - begin))
+                out[drive.slice_of(Channel(Channel.ANGLE_LEFT + offset))] = counted(
+                    motion.column(f'angle_{side}', 'wheels'), drive.wheel_angles[offset],
+                    [getattr(one.sensors, f'encoder_{side}') for one in sets],
+                    motion.shares('wheels'))
             else:
                 out[drive.slice_of(Channel(offset))] = factor * _rate(
                     motion, drive, side, reading,
@@ -367,34 +383,7 @@ def _observed(motion: Motion, drive: Drive, reading: Reading, sensors: SensorMod
             + sensors.gyro_bias + reading.get('gyro_offset'))
     if drive.pose_times.size:
         out[drive.slice_of(Channel.HEADING)] = motion.column('heading', 'pose')
-        x, y = _places(drive, motion.column('distance', 'pose'), reading)
+        x, y = chained(drive, motion.column('distance', 'pose'), reading)
         out[drive.slice_of(Channel.X)] = x
         out[drive.slice_of(Channel.Y)] = y
     return out
-
-
-def _places(drive: Drive, distance: FloatArray, reading: Reading
-            ) -> tuple[FloatArray, FloatArray]:
-    # The way between two stamps is the chord of an arc from one measured heading to the next.
-    turn, lever = reading.get('pose_turn'), reading.get('pose_lever')
-    first, shorter, ways, levers = drive.memory.remembered(
-        'ways', turn, lambda: _ways(drive, turn))
-    chord = np.diff(distance) * shorter
-    x, y = (start + distance[0] * ahead + np.concatenate([[0.0], np.cumsum(chord * way)])
-            for start, ahead, way in zip((drive.pose.x, drive.pose.y), first, ways, strict=True))
-    x += lever * levers[0]
-    y += lever * levers[1]
-    return x, y
-
-
-def _ways(drive: Drive, turn: float) -> tuple[
-        tuple[float, float], FloatArray, FloatArray, FloatArray]:
-    # Cosine and sine of the first direction; chord over arc, cosine and sine of its direction,
-    # from each stamp to the next; how far the direction of a lever has moved.
-    heading = drive.heading - turn
-    half = 0.5 * np.diff(heading)
-    middle = heading[:-1] + half
-    own = drive.heading
-    return ((float(np.cos(heading[0])), float(np.sin(heading[0]))), np.sinc(half / np.pi),
-            np.stack([np.cos(middle), np.sin(middle)]),
-            np.stack([np.cos(own) - np.cos(own[0]), np.sin(own) - np.sin(own[0])]))

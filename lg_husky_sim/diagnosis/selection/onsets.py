@@ -42,15 +42,15 @@ def onsets_of(evidence: Evidence) -> list[Onset]:
     spacing, edge = setting('onset_spacing'), setting('onset_edge')
     whole: dict[str, tuple[float, float]] = {}
     for drive in evidence.drives:
-        begin, end = whole.get(drive.recording, (np.inf, -np.inf))
-        whole[drive.recording] = min(begin, drive.start), max(end, drive.end)
+        first, last = whole.get(drive.recording, (np.inf, -np.inf))
+        whole[drive.recording] = min(first, drive.start), max(last, drive.end)
     for drive in evidence.drives:
-        name, begin, end = drive.recording, drive.start, drive.end
-        if name == evidence.names[0] and begin == whole[name][0]:
-            begin += edge
-        if end == whole[name][1]:
-            end -= edge
-        found += [Onset(OnsetKind.TIME, float(t), name) for t in np.arange(begin, end, spacing)]
+        name, first, last = drive.recording, drive.start, drive.end
+        if name == evidence.names[0] and first == whole[name][0]:
+            first += edge
+        if last == whole[name][1]:
+            last -= edge
+        found += [Onset(OnsetKind.TIME, float(t), name) for t in np.arange(first, last, spacing)]
     x = np.concatenate([d.measured[d.slice_of(Channel.X)] for d in evidence.drives])
     if x.size:
         low, high = np.quantile(x, [0.0, 1.0])
@@ -213,10 +213,14 @@ def _built_up(drive: Drive, motion: Motion, before: Motion, change: FloatArray, 
     times = frame.times[frame.order]
     states = np.zeros((times.size, STATES))
     grid = probe_times(drive)
-    for state, name in ((4, 'forward'), (5, 'yaw_rate'), (7, 'heading'), (10, 'angle_left'),
-                        (11, 'angle_right')):
+    for state, name in ((4, 'forward'), (5, 'yaw_rate'), (7, 'heading')):
         difference = motion.column(name, 'probe') - before.column(name, 'probe')
         states[:, state] = np.interp(times, grid, difference)
+    for state, side, zero in zip((10, 11), ('left', 'right'), drive.wheel_angles, strict=True):
+        # As encoders have counted them.
+        now, then = (getattr(one.plant.sets[-1].sensors, f'encoder_{side}')
+                     * (one.column(f'angle_{side}', 'probe') - zero) for one in (motion, before))
+        states[:, state] = np.interp(times, grid, now - then)
     if drive.pose_times.size and np.any(states[:, 4]):
         for state, channel in ((8, Channel.X), (9, Channel.Y)):
             part = drive.slice_of(channel)
