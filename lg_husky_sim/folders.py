@@ -6,12 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from hashlib import sha256
 from os import replace
 from pathlib import Path
+import re
 import shutil
 import tempfile
 
 from lg_husky_sim.errors import SettingsError
+
+_WRITTEN = 'written by lg_husky, which replaces it unless it was changed: sha256 '
 
 
 def check_folder(path: Path) -> None:
@@ -70,7 +74,60 @@ def check_ours(path: Path, beginning: str) -> None:
     raise SettingsError(f'{path} exists and is no such result of lg_husky; choose another name')
 
 
-def check_marked(path: Path, mark: str) -> None:
+def signed(text: str, comment: str = '# {}') -> str:
+    """
+    Return a text with one more line, by which it shows whether somebody changed it since.
+
+    Parameters
+    ----------
+    text : str
+        Ends with a line break.
+    comment : str
+        How a comment is written in it.
+
+    Returns
+    -------
+    str
+
+    """
+    return f'{text}{comment.format(_WRITTEN + sha256(text.encode()).hexdigest()[:32])}\n'
+
+
+def is_unchanged(path: Path) -> bool:
+    """Return whether a file ends with the line of :func:`signed`, and is as it was then."""
+    text, _, last = path.read_bytes().removesuffix(b'\n').rpartition(b'\n')
+    found = re.search(_WRITTEN.encode() + b'([0-9a-f]{32})', last)
+    return found is not None and sha256(text + b'\n').hexdigest()[:32].encode() == found[1]
+
+
+def check_unchanged(path: Path, beginning: str) -> None:
+    """
+    Check that a single text file may be written: none is there, or a result nobody changed.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        File that is to be written, as :func:`signed` returns it.
+    beginning : str
+        With which every such result begins. An empty file may go, too.
+
+    Raises
+    ------
+    SettingsError
+        If something else is there, such as a file written by hand that begins like a result.
+
+    """
+    check_ours(path, beginning)
+    _refuse_changed(path)
+
+
+def _refuse_changed(path: Path) -> None:
+    if path.is_file() and path.stat().st_size and not is_unchanged(path):
+        raise SettingsError(f'{path} exists and was written or changed by hand, or by an older '
+                            'lg_husky; choose another name')
+
+
+def check_marked(path: Path, mark: str, *, text: bool = False) -> None:
     """
     Check that a single file may be written: none is there, or one that has a mark of ours in it.
 
@@ -80,6 +137,8 @@ def check_marked(path: Path, mark: str) -> None:
         File that is to be written.
     mark : str
         Such as the schema. An empty file may go, too.
+    text : bool
+        Whether it is as :func:`signed` returns it, so that one changed by hand can be told.
 
     Raises
     ------
@@ -88,6 +147,8 @@ def check_marked(path: Path, mark: str) -> None:
 
     """
     if path.is_file() and mark.encode() in path.read_bytes():
+        if text:
+            _refuse_changed(path)
         return
     check_ours(path, '')
 
@@ -130,8 +191,9 @@ def result_folder(path: Path, marker: str) -> Iterator[Path]:
     Parameters
     ----------
     path : pathlib.Path
-        Where it shall be. Results of an earlier run are replaced at the end; other files stay,
-        and one that has the name of a result gets a ``~`` or more behind its own.
+        Where it shall be. Results of an earlier run are replaced at the end; other files and
+        changed models stay, and one that has the name of a result gets a ``~`` or more behind
+        its own.
     marker : str
         Name of the file that is there only if all others are, such as ``compare.json``; the
         caller writes it too.
@@ -179,6 +241,7 @@ def _install(made: Path, target: Path, names: list[str]) -> None:
     mine = there & {names[0]}
     if listed.is_file():
         mine |= there & {*listed.read_text('utf-8', 'surrogateescape').splitlines()}
+    mine -= {name for name in mine if _by_hand(target / name)}
     for name in mine - set(names[:-1]):
         _remove(target / name)
     for name in names:
@@ -188,6 +251,11 @@ def _install(made: Path, target: Path, names: list[str]) -> None:
         elif name in mine and (old.is_dir() or new.is_dir()):
             _remove(old)
         replace(new, old)
+
+
+def _by_hand(path: Path) -> bool:
+    # Models are what people change in a folder of results.
+    return path.suffix == '.yaml' and path.is_file() and not is_unchanged(path)
 
 
 def _free(folder: Path, name: str) -> Path:

@@ -9,9 +9,12 @@ from pathlib import Path
 
 import lg_husky_sim as lg
 from lg_husky_sim.cli.main import run
+from lg_husky_sim.diagnosis.planning import Separation
 from lg_husky_sim.errors import SettingsError
-from lg_husky_sim.folders import check_folder, check_ours, result_folder
+from lg_husky_sim.folders import check_folder, check_ours, result_folder, signed
 from lg_husky_sim.identification.report import report_paths
+from lg_husky_sim.manoeuvres import find_manoeuvre
+from lg_husky_sim.manoeuvres import SCHEMA as COMMANDS
 import pytest
 
 
@@ -145,6 +148,67 @@ def test_a_single_file_is_replaced_only_by_its_like(
         check_ours(path, 'schema: x')
 
 
+@pytest.mark.parametrize('name', ['a.yaml', 'a.tum', 'a.h', 'a.tex', 'a.py'])
+@pytest.mark.parametrize('change', [
+    lambda text: text + '# mine\n', lambda text: text.replace('0', '1', 1),
+    lambda text: text.rsplit('\n', 2)[0] + '\n', lambda text: text.replace('\n', '\r\n')])
+def test_a_file_that_begins_like_a_result_but_is_by_hand_stays(
+        tmp_path: Path, name: str, change: Callable[[str], str]) -> None:
+    path, husky = tmp_path / name, lg.Husky()
+    for _ in range(2):  # its like is replaced
+        _write(husky, path)
+    changed = change(path.read_text())
+    assert changed != path.read_text()
+    path.write_text(changed, newline='')
+    with pytest.raises(SettingsError, match=f'{name} exists and was written or changed by hand'):
+        _write(husky, path)
+    assert path.read_bytes() == changed.encode()
+
+
+def _write(husky: lg.Husky, path: Path) -> None:
+    if path.suffix == '.yaml':
+        husky.save(path)
+    elif path.suffix == '.tum':
+        husky.simulate([[0.0, 0.0, 0.0], [1.0, 0.5, 0.0]]).save_tum(path)
+    else:
+        husky.export(path)
+
+
+def test_a_planned_drive_replaces_a_planned_drive_and_none_by_hand(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:
+    best = Separation(find_manoeuvre('spin'), 9.0, 'yaw rate')
+    monkeypatch.setattr('lg_husky_sim.diagnosis.planning.plan', lambda *_: (best,))
+    path = tmp_path / 'plan.yaml'
+    arguments = ['plan-drive', '--effects', 'payload,yaw_scrub_coulomb', '--out', str(path)]
+    assert [run(arguments), run(arguments)] == [0, 0]
+    mine = f'schema: {COMMANDS}\nsteps:\n- {{duration: 1.0, forward: 0.5}}\n'
+    path.write_text(mine)
+    assert run(arguments) == 1
+    assert 'plan.yaml exists and was written or changed by hand' in capsys.readouterr().err
+    assert path.read_text() == mine
+
+
+def test_a_model_that_was_changed_in_a_folder_of_results_is_kept(tmp_path: Path) -> None:
+    out = tmp_path / 'found'
+    for text in ('first', 'second', 'third'):
+        _fill(out, 'model.yaml', signed(f'{text}\n'))
+        if text == 'second':
+            (out / 'model.yaml').write_text(signed('second\n').replace('second', 'mine'))
+    assert (out / 'model.yaml').read_text().startswith('third')
+    assert (out / 'model.yaml~').read_text().startswith('mine')
+    assert not (out / 'model.yaml~~').exists()
+
+
+def test_the_model_of_a_fit_that_was_changed_is_kept(tmp_path: Path) -> None:
+    path = lg.Husky().save(tmp_path / 'fit.yaml')
+    (tmp_path / 'fit.json').write_text('{\n "schema": "lg_husky_sim/fit/1"\n}\n')
+    report_paths(path)
+    path.write_text(path.read_text().replace('about:', 'about: mine,'))
+    with pytest.raises(SettingsError, match=r'fit\.yaml exists and was written or changed by'):
+        report_paths(path)
+
+
 def test_files_of_a_user_are_never_replaced(tmp_path: Path) -> None:
     model, way, plan = (tmp_path / name for name in ('a.yaml', 'a.tum', 'plan.yaml'))
     drive = lg.Husky().simulate([[0.0, 0.0, 0.0], [1.0, 0.5, 0.0]])
@@ -163,5 +227,5 @@ def test_files_of_a_user_are_never_replaced(tmp_path: Path) -> None:
     for write, path, named in writers:
         with pytest.raises(SettingsError, match=f'{named} exists and is no such result'):
             write(path)
-    assert run(['plan-drive', '--effects', 'payload,motor_inductance', '--out', str(plan)]) == 1
+    assert run(['plan-drive', '--effects', 'payload,yaw_scrub_coulomb', '--out', str(plan)]) == 1
     assert {path.read_text() for path in tmp_path.iterdir()} == {'my own\n'}

@@ -286,7 +286,7 @@ class Husky(Graph):
                         topics=topics, progress=progress)
 
     def save(self, path: PathLike) -> Path:
-        """Write the model file, which ``sim_node`` and ``Husky(path)`` read; replace only such."""
+        """Write a model file, which ``sim_node`` and ``Husky(path)`` read, over none by hand."""
         save_model(self.model, path)
         return Path(path)
 

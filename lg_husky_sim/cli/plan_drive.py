@@ -46,14 +46,14 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     from lg_husky_sim.diagnosis.planning import drives, plan, usual_speeds
     from lg_husky_sim.diagnosis.settings import setting
     from lg_husky_sim.errors import SettingsError
-    from lg_husky_sim.folders import check_ours
+    from lg_husky_sim.folders import check_unchanged
     from lg_husky_sim.manoeuvres import SCHEMA
 
     if (folder is None) == (effects is None):
         raise SettingsError('give either the folder of a diagnosis or --effects A,B')
     if out.is_dir() or not out.resolve().parent.is_dir():
         raise SettingsError(f'cannot write {out}: it must be a file in an existing folder')
-    check_ours(out, f'schema: {SCHEMA}')
+    check_unchanged(out, f'schema: {SCHEMA}')
     one, two = _from_folder(folder) if folder is not None else _from_ids(effects or '', robot)
     speed, rate = usual_speeds(one.parameters)
     candidates = drives(max_speed or speed, max_yaw or rate)
@@ -125,7 +125,7 @@ def _from_folder(folder: Path) -> tuple[Rival, Rival]:
 
 
 def _write(out: Path, manoeuvre: Manoeuvre, about: str) -> None:
-    from lg_husky_sim.folders import scratch_beside
+    from lg_husky_sim.folders import scratch_beside, signed
     from lg_husky_sim.manoeuvres import SCHEMA
     from lg_husky_sim.yaml_files import yaml_text
     data = {'schema': SCHEMA, 'about': about, 'rate': manoeuvre.rate, 'steps': [
@@ -133,5 +133,5 @@ def _write(out: Path, manoeuvre: Manoeuvre, about: str) -> None:
          'yaw': round(s.yaw, 4), 'ramp': round(s.ramp, 3)} for s in manoeuvre.steps]}
     with scratch_beside(out) as scratch:
         draft = scratch / 'script.yaml'
-        draft.write_text(yaml_text(data, flow=None), encoding='utf-8')
+        draft.write_text(signed(yaml_text(data, flow=None)), encoding='utf-8')
         os.replace(draft, out)

@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 
 from lg_husky_sim.errors import LgHuskyError, ModelFileError, ParameterError
-from lg_husky_sim.folders import check_ours, scratch_beside
+from lg_husky_sim.folders import check_unchanged, scratch_beside, signed
 from lg_husky_sim.husky.by_hand import about_of, Number, other_robot, with_numbers
 from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.model_reader import read_model
@@ -237,7 +237,7 @@ def save_model(model: ModelFile, path: str | os.PathLike[str]) -> None:
     model : ModelFile
         What is written, with all its parameters.
     path : path-like
-        Replaced if a model file is there.
+        Replaced if a model file is there that was written here and not changed since.
 
     Raises
     ------
@@ -246,8 +246,8 @@ def save_model(model: ModelFile, path: str | os.PathLike[str]) -> None:
 
     """
     place = Path(path)
-    check_ours(place, BEGINNING)
+    check_unchanged(place, BEGINNING)
     with scratch_beside(place) as scratch:
         draft = scratch / place.name
-        draft.write_text(yaml_text(model_data(model)), encoding='utf-8')
+        draft.write_text(signed(yaml_text(model_data(model))), encoding='utf-8')
         os.replace(draft, place)

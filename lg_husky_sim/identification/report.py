@@ -17,7 +17,7 @@ from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.scatter import scatter_notes
 from lg_husky_sim.comparison.traces import error_table, Predicted, traces_of
 from lg_husky_sim.errors import SettingsError
-from lg_husky_sim.folders import check_ours, scratch_beside
+from lg_husky_sim.folders import check_ours, check_unchanged, scratch_beside
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import BEGINNING, ModelFile, save_model
 from lg_husky_sim.identification.profile import LEVEL, Profile
@@ -68,7 +68,7 @@ def report_paths(out: Path) -> tuple[Path, ...]:
     Raises
     ------
     SettingsError
-        If it does not, or something is there that is no earlier fit.
+        If it does not, or something is there that is no earlier fit or a changed model.
 
     """
     if out.suffix not in ENDINGS:
@@ -76,7 +76,10 @@ def report_paths(out: Path) -> tuple[Path, ...]:
     text, data, html = (out.with_suffix(end) for end in ('.txt', '.json', '.html'))
     check_ours(data, f'{{\n "schema": "{SCHEMA}"')
     # Beside the JSON of a fit they are the fit's; a model file without one is of a person.
-    check_ours(out, BEGINNING if data.is_file() else '')
+    if data.is_file():
+        check_unchanged(out, BEGINNING)
+    else:
+        check_ours(out, '')
     for path in (text, html):
         if path.is_dir() or not data.is_file():
             check_ours(path, '')

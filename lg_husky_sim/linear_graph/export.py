@@ -14,7 +14,7 @@ from typing import Any
 
 from lg_husky_sim.errors import SettingsError
 from lg_husky_sim.extras import require
-from lg_husky_sim.folders import check_marked, scratch_beside
+from lg_husky_sim.folders import check_marked, scratch_beside, signed
 from lg_husky_sim.linear_graph.state_space import equation_forms, FloatArray, MATRICES, StateSpace
 import numpy as np
 
@@ -131,7 +131,8 @@ def export(space: StateSpace, path: str | os.PathLike[str], name: str = 'model',
         Matrices, with the names of states, inputs and outputs.
     path : path-like
         .json, .mat (MATLAB 5), .npz (NumPy), .h (C), .tex (LaTeX, amsmath) or .py (a module that
-        makes python-control and scipy objects). An export that is there is replaced.
+        makes python-control and scipy objects). An export that is there is replaced, if nobody
+        changed it.
     name : str
         Title.
     parameters : mapping of str to float, optional
@@ -149,7 +150,10 @@ def export(space: StateSpace, path: str | os.PathLike[str], name: str = 'model',
     """
     place = Path(path)
     check_export(place)
-    content = _WRITERS[place.suffix.lower()](space, name, dict(parameters or {}), place.stem)
+    ending = place.suffix.lower()
+    content = _WRITERS[ending](space, name, dict(parameters or {}), place.stem)
+    if ending in _COMMENTS:
+        content = signed(content.decode(), _COMMENTS[ending]).encode()
     with scratch_beside(place) as scratch:
         draft = scratch / place.name
         draft.write_bytes(content)
@@ -170,7 +174,7 @@ def check_export(path: Path) -> None:
     if path.suffix.lower() not in _WRITERS:
         raise SettingsError(f'cannot export to {path}: the ending must be one of '
                             f'{", ".join(_WRITERS)}')
-    check_marked(path, SCHEMA)
+    check_marked(path, SCHEMA, text=path.suffix.lower() in _COMMENTS)
 
 
 def json_text(space: StateSpace, name: str, parameters: Mapping[str, float]) -> str:
@@ -305,3 +309,5 @@ def _comment(text: str) -> str:
 _WRITERS: Mapping[str, Callable[[StateSpace, str, Mapping[str, float], str], bytes]] = {
     '.json': _as_json, '.mat': _as_mat, '.npz': _as_npz, '.h': _as_c, '.tex': _as_latex,
     '.py': _as_python}
+#: How a comment is written in those that people may write on.
+_COMMENTS: Mapping[str, str] = {'.h': '/* {} */', '.tex': '% {}', '.py': '# {}'}

@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from lg_husky_sim.folders import check_ours, scratch_beside
+from lg_husky_sim.folders import check_unchanged, scratch_beside, signed
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 
@@ -22,7 +22,7 @@ def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0)
     Parameters
     ----------
     path : path-like
-        Replaced if such a file is there.
+        Replaced if such a file is there that was written here and not changed since.
     pose : TimeSeries
         Names x, y [m], heading [rad].
     start_ns : int
@@ -39,7 +39,7 @@ def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0)
 
     """
     place = Path(path)
-    check_ours(place, HEAD)
+    check_unchanged(place, HEAD)
     stamps = start_ns + np.round(pose.times * 1e9).astype(np.int64)
     lines = [HEAD]
     for stamp, (x, y, heading) in zip(stamps.tolist(), pose.values.tolist(), strict=True):
@@ -48,6 +48,6 @@ def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0)
                      f'{np.sin(0.5 * heading):.12g} {np.cos(0.5 * heading):.12g}')
     with scratch_beside(place) as scratch:
         draft = scratch / place.name
-        draft.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        draft.write_text(signed('\n'.join(lines) + '\n'), encoding='utf-8')
         os.replace(draft, place)
     return place

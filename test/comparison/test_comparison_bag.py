@@ -87,7 +87,7 @@ def test_stamps_of_a_trajectory_keep_their_nanoseconds(
         comparison: lg.Comparison, tmp_path: Path) -> None:
     path = comparison.save_trajectories(tmp_path)[0]
     recording = comparison.outcomes[0].recording
-    lines = path.read_text('utf-8').splitlines()[1:]
+    lines = [line for line in path.read_text('utf-8').splitlines() if not line.startswith('#')]
     for line, time in zip(lines, recording.stream('pose').times, strict=True):
         seconds, nanoseconds = line.split()[0].split('.')
         assert int(seconds) * 10**9 + int(nanoseconds) == recording.start_ns + round(time * 1e9)
