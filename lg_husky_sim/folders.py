@@ -37,7 +37,25 @@ def check_folder(path: Path) -> None:
         raise SettingsError(f'{path} exists and is not a folder; choose another name')
     if (path / 'metadata.yaml').is_file():
         raise SettingsError(f'{path} is a recording; choose another folder for the results')
-    target = path.resolve()
+    check_writable(path)
+
+
+def check_writable(path: Path) -> None:
+    """
+    Check that a file or folder can be made or replaced, before the work for it.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        Folders that it is in need not exist.
+
+    Raises
+    ------
+    SettingsError
+        If nothing can be written there.
+
+    """
+    target = path.parent.resolve() if path.is_file() else path.resolve()
     there = next(one for one in (target, *target.parents) if one.exists())
     try:
         tempfile.TemporaryDirectory(prefix='.lg_husky.', dir=there).cleanup()

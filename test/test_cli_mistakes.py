@@ -72,6 +72,64 @@ def test_what_cannot_be_written_is_called_as_it_was_given(
     assert error.startswith(f'error: {arguments[-1]}: ')
 
 
+@pytest.fixture(scope='module')
+def drive(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(lg.Husky().simulate('spin').save(tmp_path_factory.mktemp('bags') / 'drive'))
+
+
+@pytest.fixture
+def idle(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no work begin."""
+    def begun(*_: object, **__: object) -> None:
+        pytest.fail('the work has begun')
+    for name in ('identification.session.read_recording', 'identification.session.run_tasks',
+                 'api.identifying.read_all', 'api.comparing.read_all', 'diagnosis.planning.plan'):
+        monkeypatch.setattr(f'lg_husky_sim.{name}', begun)
+
+
+@pytest.mark.usefixtures('idle')
+@pytest.mark.parametrize('each', [[], ['--each']])
+@pytest.mark.parametrize('more', [['--free', 'wheel_damping'], []])
+def test_a_profile_of_what_is_not_estimated_is_refused_before_the_fit(
+        drive: str, tmp_path: Path, each: list[str], more: list[str],
+        capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(['identify', drive, '--out', str(tmp_path / 'x.yaml'), '--profile', 'mass', *more,
+                *each]) == 1
+    assert "error: no profile of 'mass': it is not estimated (estimated: wheel_damping" in (
+        capsys.readouterr().err)
+
+
+@pytest.mark.usefixtures('idle')
+@pytest.mark.skipif(not Path('/proc/self').exists(), reason='a folder that takes no file')
+@pytest.mark.parametrize('arguments', [
+    ['identify', 'DRIVE', '--out', '/proc/none.yaml'],
+    ['plan-drive', '--effects', 'payload,slope', '--out', '/proc/none.yaml'],
+    ['compare', 'DRIVE', '--out', 'OUT', '--trajectories', '/proc/none'],
+    ['compare', 'DRIVE', '--out', 'OUT', '--bag', '/proc/none']])
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(
+        arguments: list[str], drive: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = {'DRIVE': drive, 'OUT': str(tmp_path / 'out')}
+    assert run([words.get(word, word) for word in arguments]) == 1
+    assert f'error: {arguments[-1]} cannot be written: /proc: ' in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(('taken', 'said'), [
+    ('tum', 'tum exists and is not a folder'), ('tum/drive_paper.tum', 'drive_paper.tum exists'),
+    ('signals.foxglove.json', 'signals.foxglove.json exists')])
+def test_compare_writes_all_or_nothing_where_a_place_is_taken(
+        taken: str, said: str, drive: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    mine = tmp_path / taken
+    mine.parent.mkdir(exist_ok=True)
+    mine.write_text('my own\n')
+    assert run(['compare', drive, '--out', str(tmp_path / 'out'), '--figures', '0', '--bag',
+                str(tmp_path / 'signals'), '--trajectories', str(tmp_path / 'tum')]) == 1
+    assert said in capsys.readouterr().err
+    assert [path for path in tmp_path.rglob('*') if path.is_file()] == [mine]
+
+
 def test_a_model_is_saved_where_it_can_be_read(tmp_path: Path) -> None:
     path = lg.Husky().save(tmp_path / 'new' / 'model.yaml')
     assert [one.name for one in path.parent.iterdir()] == ['model.yaml']

@@ -221,8 +221,7 @@ class Comparison:
 
         """
         from lg_husky_sim.comparison.signals_bag import write_trajectories
-        return tuple(path for outcome in self.outcomes
-                     for path in write_trajectories(Path(folder), outcome))
+        return write_trajectories(Path(folder), self.outcomes)
 
     def report(self, folder: PathLike | None = None) -> Path:
         """Write everything into a folder, a temporary one by default; return the page."""

@@ -24,6 +24,7 @@ from lg_husky_sim.identification.estimate import estimate
 from lg_husky_sim.identification.options import with_effects
 from lg_husky_sim.identification.report import ENDINGS, write_fit
 from lg_husky_sim.identification.result import FitResult, Method
+from lg_husky_sim.identification.unknowns import check_profiles
 from lg_husky_sim.reporting.provenance import provenance
 
 if TYPE_CHECKING:
@@ -189,6 +190,7 @@ def identify(husky: Husky, recordings: Recordings, free: Iterable[str] = (), *,
     recordings = given(recordings)
     free, effects, nuisance, profiles = map(_names, (free, effects, nuisance, profiles))
     model = with_effects(husky.model, effects)
+    check_profiles(model, free, nuisance, profiles)
     onset = model.structure.onset
     with shown(progress, known=False) as report:
         read, = rec.named_apart(rec.named_as_in(

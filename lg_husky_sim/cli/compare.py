@@ -62,18 +62,23 @@ def command(
     recordings in the order in which they were driven; a folder stands for all bags in it.
     """
     from lg_husky_sim.api.comparing import compare
-    from lg_husky_sim.folders import check_folder
-    from lg_husky_sim.recording.writer import check_target
+    from lg_husky_sim.comparison.signals_bag import check_bag, check_trajectories
+    from lg_husky_sim.folders import check_folder, check_writable
     from lg_husky_sim.reporting.write import check_extras
 
     check_extras()
     check_folder(out)
     if bag is not None:
-        check_target(bag)
+        check_bag(bag)
+        check_writable(bag)
+    if trajectories is not None:
+        check_folder(trajectories)
     with say.stages() as report:
         comparison = compare(
             recordings, models or None, rivals=rivals, horizon=horizon,
             settings=settings, topics=topics, progress=report)
+        if trajectories is not None:
+            check_trajectories(trajectories, comparison.outcomes)
         page = comparison.save(out, most, report)
     if bag is not None:
         comparison.save_bag(bag)

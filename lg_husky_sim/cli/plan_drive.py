@@ -46,7 +46,7 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     from lg_husky_sim.diagnosis.planning import drives, plan, usual_speeds
     from lg_husky_sim.diagnosis.settings import setting
     from lg_husky_sim.errors import SettingsError
-    from lg_husky_sim.folders import check_unchanged
+    from lg_husky_sim.folders import check_unchanged, check_writable
     from lg_husky_sim.manoeuvres import SCHEMA
 
     if (folder is None) == (effects is None):
@@ -54,6 +54,7 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     if out.is_dir() or not out.resolve().parent.is_dir():
         raise SettingsError(f'cannot write {out}: it must be a file in an existing folder')
     check_unchanged(out, f'schema: {SCHEMA}')
+    check_writable(out)
     one, two = _from_folder(folder) if folder is not None else _from_ids(effects or '', robot)
     speed, rate = usual_speeds(one.parameters)
     candidates = drives(max_speed or speed, max_yaw or rate)

@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 from lg_husky_sim.comparison.metrics import measured_channels, pose_rates, predicted_at, UNITS
 from lg_husky_sim.comparison.outcome import RecordingOutcome
 from lg_husky_sim.folders import check_ours
-from lg_husky_sim.recording.tum import write_tum
-from lg_husky_sim.recording.writer import write_signals
+from lg_husky_sim.recording.tum import check_tum, write_tum
+from lg_husky_sim.recording.writer import check_target, write_signals
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 
@@ -51,10 +51,8 @@ def write_comparison_bag(path: Path, outcome: RecordingOutcome, overwrite: bool 
         If a file of another origin has the name of a layout.
 
     """
-    layouts = beside(path, '.foxglove.json'), beside(path, '.plotjuggler.xml')
-    if not path.exists():  # beside such a bag, they are the bag's
-        for layout in layouts:
-            check_ours(layout, '')
+    check_bag(path, overwrite)
+    layouts = _layouts(path)
     signals, poses = comparison_signals(outcome)
     recording = outcome.recording
     write_signals(path, signals, poses, start_ns=recording.start_ns,
@@ -67,21 +65,45 @@ def write_comparison_bag(path: Path, outcome: RecordingOutcome, overwrite: bool 
     return path
 
 
+def check_bag(path: Path, overwrite: bool = False) -> None:
+    """Check that a bag and its layouts may be written, as :func:`write_comparison_bag` does."""
+    check_target(path, overwrite=overwrite)
+    if not path.exists():  # beside such a bag, they are the bag's
+        for layout in _layouts(path):
+            check_ours(layout, '')
+
+
+def _layouts(path: Path) -> tuple[Path, Path]:
+    return beside(path, '.foxglove.json'), beside(path, '.plotjuggler.xml')
+
+
 def beside(path: Path, ending: str) -> Path:
     """Return the path of a layout beside a bag."""
     return path.with_name(path.name + ending)
 
 
-def write_trajectories(folder: Path, outcome: RecordingOutcome) -> tuple[Path, ...]:
-    """Write ``RECORDING.tum`` and ``RECORDING_MODEL.tum``, in the recording's frame."""
-    _, poses = comparison_signals(outcome)
-    stem = _ros_name(outcome.recording.name)
+def write_trajectories(folder: Path, outcomes: Sequence[RecordingOutcome]) -> tuple[Path, ...]:
+    """Write ``RECORDING.tum`` and ``RECORDING_MODEL.tum``, in each recording's frame."""
+    check_trajectories(folder, outcomes)
     found = []
-    for topic, series in poses.items():
-        label = topic.split('/')[1]
-        name = stem if label == MEASURED else f'{stem}_{label}'
-        found.append(write_tum(folder / f'{name}.tum', series, outcome.recording.start_ns))
+    for outcome in outcomes:
+        for topic, series in comparison_signals(outcome)[1].items():
+            found.append(write_tum(_trajectory(folder, outcome, topic.split('/')[1]), series,
+                                   outcome.recording.start_ns))
     return tuple(found)
+
+
+def check_trajectories(folder: Path, outcomes: Sequence[RecordingOutcome]) -> None:
+    """Check that all trajectories may be written, before the first one is."""
+    for outcome in outcomes:
+        if any('pose' in part.segment.streams for part in outcome.segments):
+            for label in (MEASURED, *topic_names(outcome).values()):
+                check_tum(_trajectory(folder, outcome, label))
+
+
+def _trajectory(folder: Path, outcome: RecordingOutcome, label: str) -> Path:
+    stem = _ros_name(outcome.recording.name)
+    return folder / (f'{stem}.tum' if label == MEASURED else f'{stem}_{label}.tum')
 
 
 def topic_names(outcome: RecordingOutcome) -> dict[str, str]:

@@ -47,6 +47,7 @@ from lg_husky_sim.identification.start_states import (
     start_warnings,
 )
 from lg_husky_sim.identification.unknowns import (
+    check_profiles,
     free_names,
     NUISANCES,
     search_bounds,
@@ -110,12 +111,14 @@ def estimate(model: ModelFile, segments: Sequence[Segment], *,
     Raises
     ------
     FitError
-        If nothing is free, or eq. (23) is asked for without a pose.
+        If nothing is free, a profile is asked of what is not estimated, or eq. (23) is asked
+        for without a pose.
     RecordingError
         If no segment can be used.
 
     """
     names = free_names(model, free)
+    check_profiles(model, free, nuisance, profiles)
     began = time.perf_counter()
     used = data or observations(segments, settle_of(model.structure, nuisance))
     tell = progress or (lambda word: None)
@@ -182,11 +185,7 @@ def _result(model: ModelFile, baseline: ModelFile, segments: Sequence[Segment], 
 
 def _profile(problem: Problem, solution: Solution, sure: Confidence, name: str,
              tell: Callable[[str], None]) -> Profile:
-    names = [u.name for u in sure.unknowns]
-    if name not in names:
-        raise FitError(f'no profile of {name!r}: it was not estimated '
-                       f'(estimated: {", ".join(names)})')
-    place = names.index(name)
+    place = [u.name for u in sure.unknowns].index(name)
     return profile(problem, solution, name, float(sure.deviations[place]),
                    float(sure.inflation[place]), lambda: tell(f'profile of {name}'))
 

@@ -17,7 +17,7 @@ from lg_husky_sim.comparison.replay import replay
 from lg_husky_sim.comparison.scatter import scatter_notes
 from lg_husky_sim.comparison.traces import error_table, Predicted, traces_of
 from lg_husky_sim.errors import SettingsError
-from lg_husky_sim.folders import check_ours, check_unchanged, scratch_beside
+from lg_husky_sim.folders import check_ours, check_unchanged, check_writable, scratch_beside
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import BEGINNING, ModelFile, save_model
 from lg_husky_sim.identification.profile import LEVEL, Profile
@@ -68,11 +68,13 @@ def report_paths(out: Path) -> tuple[Path, ...]:
     Raises
     ------
     SettingsError
-        If it does not, or something is there that is no earlier fit or a changed model.
+        If it does not, nothing can be written there, or something is there that is no earlier
+        fit or a changed model.
 
     """
     if out.suffix not in ENDINGS:
         raise SettingsError(f'{out}: a model file ends in .yaml or .yml')
+    check_writable(out)
     text, data, html = (out.with_suffix(end) for end in ('.txt', '.json', '.html'))
     check_ours(data, f'{{\n "schema": "{SCHEMA}"')
     # Beside the JSON of a fit they are the fit's; a model file without one is of a person.

@@ -15,6 +15,7 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.estimate import estimate, STARTS
 from lg_husky_sim.identification.report import report_paths, write_fit
 from lg_husky_sim.identification.result import FitResult, Method
+from lg_husky_sim.identification.unknowns import check_profiles
 from lg_husky_sim.parallel import run_tasks
 from lg_husky_sim.recording import (
     named_apart,
@@ -136,6 +137,8 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
     SettingsError
         If ``out`` is a file, a recording or cannot be written, two recordings would share a
         name, or one has that of another file.
+    FitError
+        If a profile is asked of what is not estimated.
 
     """
     check_folder(out)
@@ -144,6 +147,7 @@ def fit_each(request: Request, paths: Sequence[str], out: Path, jobs: int = 1,
         raise SettingsError('two recordings have one name; --each writes a file for each')
     for name in names:
         report_paths(out / f'{name}.yaml')
+    check_profiles(request.model, request.free, request.nuisance, request.profiles)
     word = tell or (lambda text: None)
     # A worker of a cluster may work in another folder.
     tasks = [_Task(request, str(Path(path).absolute())) for path in paths]

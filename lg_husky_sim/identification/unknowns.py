@@ -70,6 +70,31 @@ def free_names(model: ModelFile, asked: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
+def check_profiles(model: ModelFile, free: Sequence[str], nuisance: Sequence[str],
+                   profiles: Sequence[str]) -> None:
+    """
+    Check that what is to be profiled will be estimated.
+
+    Parameters
+    ----------
+    model : ModelFile
+        Says what is free by default.
+    free, nuisance, profiles : sequence of str
+        As the user asked.
+
+    Raises
+    ------
+    FitError
+        If one will not be estimated.
+
+    """
+    names = [*free_names(model, free), *(name for name in nuisance if name != INITIAL_STATE)]
+    for name in profiles:
+        if name not in names:
+            raise FitError(f'no profile of {name!r}: it is not estimated '
+                           f'(estimated: {", ".join(names)})')
+
+
 def effect_parameters(model: ModelFile) -> dict[str, EffectParameter]:
     """Return the numbers of the model's effects by name."""
     return {p.name: p for effect in model.structure.effects for p in effect.parameters()}

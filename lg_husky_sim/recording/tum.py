@@ -15,6 +15,19 @@ import numpy as np
 HEAD = '# timestamp x y z qx qy qz qw'
 
 
+def check_tum(path: Path) -> None:
+    """
+    Check that a trajectory may be written at a path.
+
+    Raises
+    ------
+    SettingsError
+        If something else is there.
+
+    """
+    check_unchanged(path, HEAD)
+
+
 def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0) -> Path:
     """
     Write a trajectory, whole or not at all.
@@ -39,7 +52,7 @@ def write_tum(path: str | os.PathLike[str], pose: TimeSeries, start_ns: int = 0)
 
     """
     place = Path(path)
-    check_unchanged(place, HEAD)
+    check_tum(place)
     stamps = start_ns + np.round(pose.times * 1e9).astype(np.int64)
     lines = [HEAD]
     for stamp, (x, y, heading) in zip(stamps.tolist(), pose.values.tolist(), strict=True):
