@@ -130,6 +130,19 @@ def test_compare_writes_all_or_nothing_where_a_place_is_taken(
     assert [path for path in tmp_path.rglob('*') if path.is_file()] == [mine]
 
 
+def test_compare_replaces_a_bag_as_its_message_says(
+        drive: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = tmp_path / 'signals'
+    arguments = ['compare', drive, '--out', str(tmp_path / 'out'), '--figures', '0', '--bag',
+                 str(bag)]
+    assert run(arguments) == 0
+    first = (bag / 'metadata.yaml').stat().st_ino
+    assert run(arguments) == 1
+    assert 'or allow it to be replaced (--overwrite' in capsys.readouterr().err
+    assert run([*arguments, '--overwrite']) == 0
+    assert (bag / 'metadata.yaml').stat().st_ino != first
+
+
 def test_a_model_is_saved_where_it_can_be_read(tmp_path: Path) -> None:
     path = lg.Husky().save(tmp_path / 'new' / 'model.yaml')
     assert [one.name for one in path.parent.iterdir()] == ['model.yaml']

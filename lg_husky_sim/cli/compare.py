@@ -45,13 +45,15 @@ if TYPE_CHECKING:
 @click.option('--bag', type=click.Path(path_type=Path), metavar='BAG',
               help='Write measured, predicted and residual of the first REC as a rosbag2, with '
                    'layouts for Foxglove and PlotJuggler next to it.')
+@click.option('--overwrite', is_flag=True,
+              help='Replace a rosbag2 that is at BAG, with its layouts.')
 @click.option('--trajectories', type=click.Path(path_type=Path), metavar='DIR',
               help='Write trajectories in the TUM format, for evo.')
 @spoken(page=True)
 def command(
     recordings: tuple[str, ...], models: tuple[Path, ...], out: Path, rivals: tuple[str, ...],
     settings: dict[str, float], topics: TopicMap, horizon: float, most: int,
-    bag: Path | None, trajectories: Path | None, say: Output,
+    bag: Path | None, overwrite: bool, trajectories: Path | None, say: Output,
 ) -> None:
     """
     Replay the commands of recordings through models and show how far the models are off.
@@ -69,7 +71,7 @@ def command(
     check_extras()
     check_folder(out)
     if bag is not None:
-        check_bag(bag)
+        check_bag(bag, overwrite)
         check_writable(bag)
     if trajectories is not None:
         check_folder(trajectories)
@@ -81,7 +83,7 @@ def command(
             check_trajectories(trajectories, comparison.outcomes)
         page = comparison.save(out, most, report)
     if bag is not None:
-        comparison.save_bag(bag)
+        comparison.save_bag(bag, overwrite=overwrite)
     if trajectories is not None:
         comparison.save_trajectories(trajectories)
     say.result(comparison, comparison.data())
