@@ -30,6 +30,7 @@ from lg_husky_sim.linear_graph.netlist import (
     parse_netlist,
     read_netlist,
 )
+from lg_husky_sim.yaml_files import shown
 
 _ELEMENTS = re.compile(r'\belements\s*:')
 
@@ -327,14 +328,12 @@ def graph(source: str | os.PathLike[str] | dict[str, Any] | LinearGraph,
     ModelFileError
         If the file is neither a netlist nor a model file.
     GraphError
-        If the graph cannot be built.
-    TypeError
-        If the source is of another type.
+        If the source is of another type, or the graph cannot be built.
 
     """
     if not isinstance(source, str | os.PathLike | LinearGraph | dict):
-        raise TypeError(f'lg.graph takes a netlist file, the text or the dict of one, or a '
-                        f'LinearGraph, not {type(source).__name__}')
+        raise GraphError(f'{shown(source)} is no linear graph: lg.graph takes a netlist file, '
+                         'the text or the dict of one, or a LinearGraph')
     if isinstance(source, str) and source in ('simplified', 'expanded'):
         from lg_husky_sim.api.robots import paper_graph
         return paper_graph(source, outputs)

@@ -13,7 +13,15 @@ from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim import recording as rec
 from lg_husky_sim.api.progress import Shown, shown
-from lg_husky_sim.api.recordings import check_count, given, PathLike, read_all, Recordings, Topics
+from lg_husky_sim.api.recordings import (
+    check_count,
+    check_seed,
+    given,
+    PathLike,
+    read_all,
+    Recordings,
+    Topics,
+)
 from lg_husky_sim.api.robots import Husky
 from lg_husky_sim.api.sensor_warnings import warnings_of
 from lg_husky_sim.api.tables import page_part, Table
@@ -185,6 +193,7 @@ def identify(husky: Husky, recordings: Recordings, free: Iterable[str] = (), *,
     methods = [one.value for one in Method]
     if method not in methods:
         raise FitError(f'method {method!r} is unknown; there are {", ".join(methods)}')
+    check_seed(seed)
     check_count('starts', starts)
     check_count('jobs', jobs)
     recordings = given(recordings)

@@ -342,6 +342,12 @@ def given(source: Recordings) -> list[Path | rec.Recording]:
     return found
 
 
+def check_seed(seed: object) -> None:
+    """Check a seed of random numbers."""
+    if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
+        raise CommandError(f'seed = {shown(seed)}: a whole number of at least 0 is needed')
+
+
 def check_count(name: str, value: object) -> None:
     """
     Check how many processes, threads or starts are asked for.

@@ -240,7 +240,7 @@ class Husky(Graph):
         RecordingError
             If there is no recording, or one cannot be used.
         CommandError
-            If starts or jobs are fewer than one.
+            If starts or jobs are fewer than one, or the seed is negative.
 
         """
         from lg_husky_sim.api.identifying import identify

@@ -12,6 +12,7 @@ from lg_husky_sim.linear_graph.expressions import compile_tuple, GLOBALS
 from lg_husky_sim.linear_graph.graph import LinearGraph, suggestion
 from lg_husky_sim.linear_graph.numeric import compile_numeric
 from lg_husky_sim.linear_graph.state_space import FloatArray
+from lg_husky_sim.yaml_files import shown
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -71,7 +72,7 @@ class RightHandSide:
     def efforts(self, state: ArrayLike, inputs: ArrayLike = ()) -> FloatArray:
         """Return all efforts f(z) [SI], shape (k,), at a state (n,) and inputs (m,)."""
         space = self.space
-        arguments = space.H @ np.asarray(state) + space.K @ self._inputs(inputs)
+        arguments = space.H @ self._states(state) + space.K @ self._inputs(inputs)
         found = np.zeros(len(self._codes))
         for at in self._order:
             where = self._slices[at]
@@ -83,11 +84,10 @@ class RightHandSide:
         return found
 
     def _inputs(self, inputs: ArrayLike) -> FloatArray:
-        given = np.atleast_1d(np.asarray(inputs, dtype=np.float64))
-        if given.shape != (len(self.space.inputs),):
-            raise ParameterError(f'{given.size} input(s) given; the graph has '
-                                 f'{len(self.space.inputs)}: {", ".join(self.space.inputs)}')
-        return given
+        return _numbers('input', inputs, self.space.inputs)
+
+    def _states(self, state: ArrayLike) -> FloatArray:
+        return _numbers('state', state, self.space.states)
 
     def __call__(self, time: float, state: ArrayLike, inputs: ArrayLike = ()) -> FloatArray:
         """
@@ -106,15 +106,31 @@ class RightHandSide:
         -------
         numpy.ndarray, shape (n,)
 
+        Raises
+        ------
+        ParameterError
+            If there are more or fewer states or inputs than the graph has, or they are no numbers.
+
         """
-        rate: FloatArray = (self.space.A @ np.asarray(state)
+        rate: FloatArray = (self.space.A @ self._states(state)
                             + self.space.B @ self._inputs(inputs)
                             + self.space.G @ self.efforts(state, inputs))
         return rate
 
     def output(self, state: ArrayLike, inputs: ArrayLike = ()) -> FloatArray:
         """Return the outputs, shape (p,), in the order of ``space.outputs``."""
-        found: FloatArray = (self.space.C @ np.asarray(state)
+        found: FloatArray = (self.space.C @ self._states(state)
                              + self.space.D @ self._inputs(inputs)
                              + self.space.L_c @ self.efforts(state, inputs))
         return found
+
+
+def _numbers(what: str, given: ArrayLike, names: Sequence[str]) -> FloatArray:
+    try:
+        found = np.atleast_1d(np.asarray(given, dtype=np.float64))
+    except (ValueError, TypeError) as error:
+        raise ParameterError(f'{what}s = {shown(given)} are no numbers') from error
+    if found.shape != (len(names),):
+        said = f'{found.size} {what}(s)' if found.ndim == 1 else f'{what}s as a table'
+        raise ParameterError(f'{said} given; the graph has {len(names)}: {", ".join(names)}')
+    return found

@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+import re
 
 import lg_husky_sim as lg
 from lg_husky_sim.cli.main import run
-from lg_husky_sim.errors import ModelFileError, ParameterError
+from lg_husky_sim.errors import GraphError, ModelFileError, ParameterError
 from lg_husky_sim.linear_graph import (
     Branch,
     compile_numeric,
@@ -128,7 +129,8 @@ def test_a_graph_is_read_from_a_dict_too() -> None:
 
 @pytest.mark.parametrize('source', [None, 3, ['R']])
 def test_what_is_no_graph_is_refused_in_plain_words(source: object) -> None:
-    with pytest.raises(TypeError, match=r'^lg\.graph takes a netlist file, the text or the dict'):
+    said = f'^{re.escape(repr(source))} is no linear graph: lg.graph takes a netlist'
+    with pytest.raises(GraphError, match=said):
         lg.graph(source)  # type: ignore[arg-type]
 
 
