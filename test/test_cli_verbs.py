@@ -103,6 +103,18 @@ def test_manoeuvres_and_parameters_are_listed(tmp_path: Path) -> None:
     assert free['gear_ratio'] is False
 
 
+def test_verbs_that_show_a_model_take_it_as_robot(tmp_path: Path) -> None:
+    path = str(lg.Husky(mass=60.0, about='The heavy one').save(tmp_path / 'heavy.yaml'))
+    for option in ('--robot', '--model'):
+        rows = json.loads(run('parameters', option, path, '--json').output)
+        assert next(row['value'] for row in rows if row['parameter'] == 'mass') == 60.0
+        assert run('derive', option, path).output.startswith('The heavy one\n')
+    for verb, said in (('parameters', 'one model is listed'), ('derive', 'one graph is derived')):
+        done = run(verb, path, '--robot', path)
+        assert done.exit_code == 2
+        assert said in done.output
+
+
 def test_info_says_what_a_bag_is_good_for(drive: str) -> None:
     said = run('info', drive)
     assert said.exit_code == 0

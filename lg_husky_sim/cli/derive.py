@@ -18,7 +18,8 @@ PAPER = ('simplified', 'expanded')
 
 @click.command(short_help='Derive the state-space model of a linear graph; draw and export it.')
 @click.argument('graph', required=False, metavar='[GRAPH]', type=Words(lambda: PAPER, files=True))
-@click.option('--model', metavar='GRAPH', type=Words(lambda: PAPER, files=True),
+@click.option('--model', '--robot', 'model', metavar='GRAPH',
+              type=Words(lambda: PAPER, files=True),
               help='Another way to give GRAPH, as in other verbs.')
 @click.option('--output', 'outputs', multiple=True, metavar='VARIABLE',
               help="An output variable, such as 'i(L_1)'; may be given several times.")
@@ -53,7 +54,7 @@ def command(graph: str | None, model: str | None, outputs: tuple[str, ...],
         check_export(path)
     if graph and model:
         message = f'{graph} and --model {model} are given; one graph is derived at a time'
-        raise click.UsageError(message)
+        raise click.UsageError(message, click.get_current_context())
     derived = _load(graph or model or PAPER[0], outputs)
     text = derived.latex(by_parameter) if latex else derived.text(by_parameter)
     if picture is not None:

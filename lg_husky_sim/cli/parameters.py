@@ -7,13 +7,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from lg_husky_sim.cli.common import MODEL, Output, spoken
+from lg_husky_sim.cli.common import MODEL, model_option, Output, spoken
 
 
 @click.command(short_help="List a model's parameters: value, unit, bounds, source.")
 @click.argument('model', required=False, metavar='[FILE.yaml]', type=MODEL)
+@model_option('--robot', '--model', 'robot')
 @spoken()
-def command(model: Path | None, say: Output) -> None:
+def command(model: Path | None, robot: Path | None, say: Output) -> None:
     """
     List the parameters of a model file, of the packaged Husky by default.
 
@@ -21,4 +22,7 @@ def command(model: Path | None, say: Output) -> None:
     accepts. tolerance is the relative standard deviation assumed before a fit.
     """
     from lg_husky_sim.api.robots import Husky
-    say.result(Husky(model).table())
+    if model is not None and robot is not None:
+        message = f'{model} and --robot {robot} are given; one model is listed at a time'
+        raise click.UsageError(message, click.get_current_context())
+    say.result(Husky(robot if model is None else model).table())
