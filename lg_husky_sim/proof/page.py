@@ -31,6 +31,10 @@ noise, ticks, how wheel speeds are computed, stamps, jitter, rates, the base's o
 late messages, missing sensors, lengths, the form of each law. Some families of them are left out
 of tuning (`left_out_of_tuning` in `config/blind_trial.yaml`). A reported set is used once; its
 seeds are refused afterwards.
+
+Single effects that are too weak to show are not counted: those that would explain next to nothing
+even if the truth were known (`undetectable`), and weak ones about which the diagnosis is not sure
+either (`weak`; the bars are `oracle` in `config/blind_trial.yaml`).
 """
 
 

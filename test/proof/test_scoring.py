@@ -265,6 +265,7 @@ def test_text_and_page_say_the_figures_of_each_set_apart() -> None:
     assert page.count('| single effects: named right | 2 of 3 | 67 % (21 % to 94 %) '
                       '| ≥ 80 % | missed |') >= 2
     assert 'lg_husky prove --from docs/some.jsonl --page docs/proof.md' in page
+    assert 'Single effects that are too weak to show are not counted' in page
     assert '| `lg_husky prove --report` | `c0ffee` | 10000 to 10005 | 6 of 6 |' in page
     assert page.index('## Reported trial') < page.index('## Tuning trial')
     assert '| slope | 3 | 2 | 3 | payload 1 |' in page
