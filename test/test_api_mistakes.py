@@ -61,6 +61,8 @@ _ANY: Any = lg
 
 @pytest.mark.parametrize(('ask', 'said'), [
     (lambda husky, drive: _ANY.read(['drive']), "['drive'] is no recording, nor the path of one"),
+    (lambda husky, drive: _ANY.read(''), "'' is no recording: the path is empty"),
+    (lambda husky, drive: husky.compare(''), "'' is no recording: the path is empty"),
     (lambda husky, drive: _ANY.compare(3), '3 is no recording, nor the path of one'),
     (lambda husky, drive: _ANY.compare(drive, rivals=3), '3 is no recording, nor the path of one'),
     (lambda husky, drive: _ANY.read('x', topics='x'), "topics = 'x' is no mapping of roles"),

@@ -36,6 +36,28 @@ def test_a_choice_that_cannot_be_understood_ends_with_2(
 
 
 @pytest.mark.parametrize(('arguments', 'said'), [
+    (['prove', '--calibrate'], '--calibrate needs --from FILE.jsonl'),
+    (['prove', '--from', __file__, '--out', 'x'], '--from recomputes the figures'),
+    (['plan-drive', '--out', 'x'], 'give either the folder of a diagnosis or --effects A,B'),
+    (['plan-drive', '--effects', 'slope', '--out', 'x'], "--effects 'slope': expected two"),
+    (['evaluate', '--out', 'x', '--rival', 'x'], '--held-out and --rival need --calibrate REC'),
+    (['derive', ''], "'' names nothing; leave it out for the default"),
+    (['identify', 'x', '--out', 'x.yaml', '--free', ''], "'' names nothing; leave it out"),
+    (['identify', 'x', '--out', 'x.yaml', '--effects', ' , '], "' , ' names nothing; leave it"),
+    (['simulate', '--commands', '', '--out', 'x'], "'' names nothing; leave it out"),
+    (['info', ''], "'' names no file or folder"),
+    (['compare', '', '--out', 'x'], "'' names no file or folder"),
+    (['parameters', ''], "'' names no file or folder"),
+    (['effects', ''], "'' names nothing; leave it out")])
+def test_a_command_that_contradicts_itself_or_names_nothing_ends_with_2(
+        arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(arguments) == 2
+    error, = capsys.readouterr().err.splitlines()
+    assert said in error
+    assert error.endswith(f'(see lg_husky {arguments[0]} -h)')
+
+
+@pytest.mark.parametrize(('arguments', 'said'), [
     (['schema', 'modle'],
      "'modle' is not one of graph, model, commands, sim_node; did you mean model?"),
     (['identify', 'drive', '--out', 'x.yaml', '--method', 'least-square'],

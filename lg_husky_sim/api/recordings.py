@@ -389,4 +389,6 @@ def listed(source: Recordings) -> list[Path | rec.Recording]:
 def _place(path: object) -> Path:
     if not isinstance(path, (str, os.PathLike)):
         raise RecordingError(f'{shown(path)} is no recording, nor the path of one')
+    if not os.fspath(path):
+        raise RecordingError("'' is no recording: the path is empty")
     return Path(path)

@@ -115,6 +115,11 @@ def _console() -> Any:
     return Console(highlight=False)
 
 
+def misused(message: str) -> click.UsageError:
+    """Return the error of a command line that contradicts itself, which ends with 2."""
+    return click.UsageError(message, click.get_current_context())
+
+
 def spoken(*, page: bool = False, data: bool = True) -> Callable[[Function], Function]:
     """
     Add ``-q``, ``-v``, ``--json`` and ``--open`` to a verb; it gets an `Output` as ``say``.
@@ -191,6 +196,13 @@ class Words(_TextType):
         self._known, self._separator = known, separator
         self._ending, self._files = ending, files
 
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+                ) -> Any:
+        """Return the text, which must not be empty: nothing is meant by leaving it out."""
+        if not str(value).replace(self._separator or ' ', '').strip():
+            self.fail(f'{value!r} names nothing; leave it out for the default', param, ctx)
+        return value
+
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str
                        ) -> list[CompletionItem]:
         """Return the words that begin so."""
@@ -231,8 +243,19 @@ def _roles() -> list[str]:
     return [field.name for field in fields(TopicMap)]
 
 
+class Place(click.Path):
+    """A path that is not empty, which would be the folder that one is in."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+                ) -> Any:
+        """Return the path."""
+        if not str(value).strip():
+            self.fail(f'{value!r} names no file or folder', param, ctx)
+        return super().convert(value, param, ctx)
+
+
 #: A recording: a file or folder.
-RECORDING = click.Path()
+RECORDING = Place()
 EFFECT = Words(_effects)
 EFFECTS = Words(_effects, ',')
 PARAMETERS = Words(_parameters, ',')
@@ -240,7 +263,7 @@ NUISANCES = Words(_nuisances, ',')
 SETTING = Words(_parameters, ending='=')
 TOPIC = Words(_roles, ending='=')
 COMMANDS = Words(_manoeuvres, files=True)
-MODEL = click.Path(path_type=Path)
+MODEL = Place(path_type=Path)
 
 
 def _topics(context: click.Context, _: click.Parameter, given: tuple[str, ...]) -> TopicMap:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from lg_husky_sim.cli.common import Output, spoken, Words
+from lg_husky_sim.cli.common import misused, Output, spoken, Words
 
 if TYPE_CHECKING:
     from lg_husky_sim.api.graphs import Graph
@@ -54,7 +54,7 @@ def command(graph: str | None, model: str | None, outputs: tuple[str, ...],
         check_export(path)
     if graph and model:
         message = f'{graph} and --model {model} are given; one graph is derived at a time'
-        raise click.UsageError(message, click.get_current_context())
+        raise misused(message)
     derived = _load(graph or model or PAPER[0], outputs)
     text = derived.latex(by_parameter) if latex else derived.text(by_parameter)
     if picture is not None:

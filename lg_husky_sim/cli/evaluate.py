@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 from lg_husky_sim.cli.common import (
+    misused,
     model_option,
     Output,
     RECORDING,
@@ -76,7 +77,7 @@ def command(
     check_extras()
     check_folder(out)
     if (held_out or rivals) and not calibrate:
-        raise CommandError('--held-out and --rival need --calibrate REC')
+        raise misused('--held-out and --rival need --calibrate REC')
     start = apply_settings(load_model(model), settings)
     chosen = cases
     if (cases or not (calibrate or steps)) and other_robot(packaged().parameters,

@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from lg_husky_sim.cli.common import MODEL, model_option, Output, spoken
+from lg_husky_sim.cli.common import misused, MODEL, model_option, Output, spoken
 
 
 @click.command(short_help="List a model's parameters: value, unit, bounds, source.")
@@ -24,5 +24,5 @@ def command(model: Path | None, robot: Path | None, say: Output) -> None:
     from lg_husky_sim.api.robots import Husky
     if model is not None and robot is not None:
         message = f'{model} and --robot {robot} are given; one model is listed at a time'
-        raise click.UsageError(message, click.get_current_context())
+        raise misused(message)
     say.result(Husky(robot if model is None else model).table())

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from lg_husky_sim.cli.common import Output, spoken
+from lg_husky_sim.cli.common import misused, Output, spoken
 
 if TYPE_CHECKING:
     from lg_husky_sim.diagnosis.planning import Rival
@@ -50,7 +50,7 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
     from lg_husky_sim.manoeuvres import SCHEMA
 
     if (folder is None) == (effects is None):
-        raise SettingsError('give either the folder of a diagnosis or --effects A,B')
+        raise misused('give either the folder of a diagnosis or --effects A,B')
     if out.is_dir() or not out.resolve().parent.is_dir():
         raise SettingsError(f'cannot write {out}: it must be a file in an existing folder')
     check_unchanged(out, f'schema: {SCHEMA}')
@@ -78,12 +78,11 @@ def command(folder: Path | None, effects: str | None, robot: Path | None, out: P
 
 def _from_ids(text: str, robot: Path | None) -> tuple[Rival, Rival]:
     from lg_husky_sim.diagnosis.planning import typical
-    from lg_husky_sim.errors import SettingsError
     from lg_husky_sim.husky.model_file import load_model
     names = [part.strip() for part in text.split(',')]
     if len(names) != 2 or not all(names) or names[0] == names[1]:
-        raise SettingsError(f'--effects {text!r}: expected two different ids, such as '
-                            'yaw_scrub_coulomb,terrain_change')
+        raise misused(f'--effects {text!r}: expected two different ids, such as '
+                      'yaw_scrub_coulomb,terrain_change')
     model = load_model(robot).in_proportion()
     one, two = (typical(name, model.structure, model.parameters, side)
                 for name, _, side in (part.partition(':') for part in names))

@@ -60,11 +60,11 @@ def command(
     answers, the diagnoses, and outcomes.jsonl (one line a case), from which --from makes
     every figure again in seconds.
     """
-    from lg_husky_sim.errors import CommandError
+    from lg_husky_sim.cli.common import misused
     from lg_husky_sim.proof import outcomes
 
     if calibrate and not sources:
-        raise CommandError('--calibrate needs --from FILE.jsonl: outcomes to calibrate on')
+        raise misused('--calibrate needs --from FILE.jsonl: outcomes to calibrate on')
     if sources and calibrate:
         from lg_husky_sim.proof.calibration import calibrated
 
@@ -74,12 +74,12 @@ def command(
         return
     if sources:
         if out or given or generate_only or score_only:
-            raise CommandError('--from recomputes the figures of earlier trials; it can be '
-                               'combined with --page only')
+            raise misused('--from recomputes the figures of earlier trials; it can be combined '
+                          'with --page only')
         _report([(path, *outcomes.read(path)) for path in sources], page, sources)
         return
     if out is None:
-        raise CommandError('--out DIR is missing: the folder of the trial')
+        raise misused('--out DIR is missing: the folder of the trial')
     path = _trial(cases, seed, tuning, world, jobs, out, given, held_out, generate_only,
                   score_only)
     if path is not None:

@@ -130,7 +130,7 @@ def test_the_engine_turns_less_on_grippy_ground_and_weighs_what_it_should() -> N
 
 def test_bad_requests_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str],
                                    monkeypatch: pytest.MonkeyPatch) -> None:
-    assert run(['evaluate', '--out', str(tmp_path / 'x'), '--held-out', 'a']) == 1
+    assert run(['evaluate', '--out', str(tmp_path / 'x'), '--held-out', 'a']) == 2
     assert '--held-out and --rival need --calibrate' in capsys.readouterr().err
     with pytest.raises(CommandError, match='give exactly one'):
         recorded_case(['a', 'b'], [], [])
