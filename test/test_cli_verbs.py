@@ -86,6 +86,8 @@ def test_an_effect_says_what_shows_it_and_what_to_change() -> None:
     said = run('effects', 'coulomb_drivetrain').output
     assert 'Drives that bring it out\n  - ' in said
     assert 'turn the wheels by hand (<where>): <dry_torque> N·m of dry friction' in said
+    assert 'In angle brackets\n  - numbers and words that the report of a diagnosis' in said
+    assert 'In angle brackets' not in run('effects', 'gyro_sign').output
     assert '`friction` in the URDF' in said
     assert '<code>friction</code>' in lg.list_effects('coulomb_drivetrain').html()
     assert all('{' not in str(lg.list_effects(name)) for name in catalogue())

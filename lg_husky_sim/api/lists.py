@@ -48,6 +48,8 @@ def list_effects(name: str | None = None, model: PathLike | Husky | None = None)
         'On the robot, where it is found': tuple(map(_open, advice.robot)),
         'In the simulator': tuple(map(_open, advice.simulator)),
         'Parameters of sim_node that do nearly the same': tuple(map(_open, advice.instead))}
+    if any('<' in sentence for sentences in notes.values() for sentence in sentences):
+        notes['In angle brackets'] = ('numbers and words that the report of a diagnosis fills in',)
     return Table(f'{kind.id}: {kind.title}',
                  ('parameter', 'unit', 'typical', 'lower', 'upper', 'estimated', 'source'),
                  tuple((p.name, p.unit, p.starts[0], p.lower, p.upper,

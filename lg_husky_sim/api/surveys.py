@@ -24,6 +24,7 @@ from lg_husky_sim.identification.problem import observations
 from lg_husky_sim.identification.unknowns import free_names, unknowns_of
 from lg_husky_sim.recording.recording import CONTINUOUS
 from lg_husky_sim.recording.topics import TYPES
+from lg_husky_sim.reporting.words import plus_minus
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.yaml_files import read_yaml
@@ -254,7 +255,7 @@ def _unmeasured(recording: Recording) -> tuple[str, ...]:
 
 def _related(related: Sequence[Relation]) -> Table:
     """Return what each stream says of the others, without a model of the robot."""
-    return Table('Sensors compared with each other (factor: reference over source)', (
+    return Table('Sensors, two at a time, compared (factor: reference over source)', (
         'quantity', 'source', 'reference', 'factor', 'lag of the source [s]', 'explained'), tuple(
         (one.quantity, one.source, one.reference,
          _number(one.factor, 4) + ' m/rad' * (one.source == 'wheels'), _number(one.late, 2),
@@ -316,6 +317,6 @@ def _parameters(parts: Sequence[rec.Segment], husky: Husky
     for unknown, value, low, high in zip(sure.unknowns, values, sure.low, sure.high, strict=True):
         half = 0.5 * float(high - low) / max(abs(float(value)), 1e-12)
         entry = husky.parameters.entry(unknown.name)
-        rows.append((unknown.name, entry.value, entry.unit, f'±{100.0 * half:.2g} %',
+        rows.append((unknown.name, entry.value, entry.unit, plus_minus(half),
                      'determined' if half < limits()['wide_interval'] else 'hardly determined'))
     return Table(title, columns, tuple(rows)), undetermined(sure, values), ()

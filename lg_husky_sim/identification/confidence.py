@@ -16,6 +16,7 @@ import itertools
 
 from lg_husky_sim.identification.least_squares import Problem, Solution, Unknown
 from lg_husky_sim.identification.settings import setting
+from lg_husky_sim.reporting.words import plus_minus
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 from scipy.special import ndtri, stdtrit
@@ -219,4 +220,4 @@ def undetermined(result: Confidence, values: FloatArray) -> tuple[str, ...]:
 
 def _width(reach: float) -> str:
     # Half the width of an interval of a logarithm.
-    return f'±{100 * reach:.2g} %' if reach < 1.0 else f'a factor of {np.exp(min(reach, 50)):.2g}'
+    return plus_minus(reach) if reach < 1.0 else f'a factor of {np.exp(min(reach, 50)):.2g}'

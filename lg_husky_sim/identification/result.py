@@ -14,7 +14,7 @@ from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.identification.profile import Profile
 from lg_husky_sim.identification.settings import least_noise, setting
 from lg_husky_sim.identification.start_states import HEAD, StartState, summary
-from lg_husky_sim.reporting.words import change, digits_apart, plural, quantity
+from lg_husky_sim.reporting.words import change, digits_apart, plural, quantity, with_unit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
@@ -169,8 +169,7 @@ class FitResult:
     @property
     def loss(self) -> str:
         """Return these losses in a sentence; '' for nothing."""
-        said = ', '.join(f'{quantity(one.name)} {change(one.before, one.after)}'
-                         for one in self.losses)
+        said = ', '.join(f'{quantity(one.name)} {_worse(one)}' for one in self.losses)
         return ('Driven by the commands alone, the fitted model predicts worse than the one '
                 f'before: {said}') if said else ''
 
@@ -244,6 +243,14 @@ class FitResult:
             'start_states': [asdict(s) for s in self.start_states],
             'undetermined': list(self.undetermined), 'warnings': list(self.warnings),
         }
+
+
+def _worse(one: ChannelFit) -> str:
+    if not math.isfinite(one.after):
+        return 'beyond all bounds'
+    if one.before > 0.0:
+        return change(one.before, one.after)
+    return f'from 0 to {with_unit(one.after, one.unit)}'
 
 
 def _channels(fits: Sequence[ChannelFit]) -> list[dict[str, object]]:

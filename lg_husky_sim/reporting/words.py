@@ -139,6 +139,11 @@ def digits_apart(value: float, low: float, high: float) -> int:
         sys.float_info.dig)
 
 
+def plus_minus(share: float) -> str:
+    """Return half a width, a share of a value, in per cent; a dash for one without end."""
+    return f'±{number(100.0 * share, 2)} %' if math.isfinite(share) else UNKNOWN
+
+
 def change(before: float, after: float, decimals: int = 0) -> str:
     """Return a change in per cent with its sign; a dash where there is none."""
     if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 import json
+from math import inf
 from pathlib import Path
 
 import lg_husky_sim as lg
 from lg_husky_sim.cli.main import run
+from lg_husky_sim.identification.result import ChannelFit
 from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
@@ -39,6 +41,15 @@ def test_a_loss_stands_under_the_headline_in_every_file(
     page = out.with_suffix('.html').read_text(encoding='utf-8')
     assert WORSE in page
     assert f'+{100.0 * (grown - 1.0):.0f}\u00a0%' in page
+
+
+def test_a_loss_that_has_no_share_is_said_in_numbers() -> None:
+    fit = lg.Husky().identify(lg.Husky().simulate('spin'), ['wheel_damping'], progress=False)
+    driven = (ChannelFit('forward', 'm/s', 9, 0.0, 0.25), ChannelFit('position', 'm', 9, 1.0, inf),
+              ChannelFit('yaw_rate', 'rad/s', 9, 0.1, 0.2))
+    loss = replace(fit.result, driven=driven).loss
+    assert loss.endswith('forward speed from 0 to 0.25 m/s, position beyond all bounds, '
+                         'yaw rate +100\u00a0%')
 
 
 def test_a_model_that_fits_better_has_no_loss() -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from lg_husky_sim.reporting.advice import filled
-from lg_husky_sim.reporting.words import change, in_a_row, with_interval
+from lg_husky_sim.reporting.words import change, in_a_row, plus_minus, with_interval
 import pytest
 
 
@@ -21,6 +21,13 @@ import pytest
 def test_an_estimate_differs_from_the_ends_of_its_interval(
         estimate: tuple[float, float, float, str], text: str) -> None:
     assert with_interval(*estimate) == text
+
+
+@pytest.mark.parametrize(('share', 'text'), [
+    (0.0032, '±0.32 %'), (0.14, '±14 %'), (0.996, '±100 %'), (1.37, '±137 %'), (20.0, '±2000 %'),
+    (math.inf, '–')])
+def test_a_half_width_in_per_cent_has_no_power_of_ten(share: float, text: str) -> None:
+    assert plus_minus(share) == text
 
 
 def test_names_in_a_row_can_be_told_apart() -> None:
