@@ -200,7 +200,8 @@ def report_data(result: FitResult, segments: Sequence[Segment], before: ModelFil
         parameters=tuple(_parameter(one, result.model) for one in result.estimates),
         parameters_first=True,
         notes=(f'Errors are {SIGN}; x is ahead and y to the left of the robot as it stood at the '
-               'start of the recording.', *result.undetermined, *_scatter(replayed, segments)),
+               'start of the recording.', *[result.held] * bool(result.held),
+               *result.undetermined, *_scatter(replayed, segments)),
         provenance=provenance or Provenance())
 
 

@@ -174,6 +174,19 @@ class FitResult:
                 f'before: {said}') if said else ''
 
     @property
+    def held(self) -> str:
+        """Return in a sentence what the intervals take as exact; '' for nothing."""
+        known = [p.tolerance for p in self.model.parameters.entries
+                 if 0.0 < p.tolerance < 1.0 and p.name not in self.values]
+        if not known:
+            return ''
+        low, high = f'{100.0 * min(known):g}', f'{100.0 * max(known):g}'
+        return (f'The intervals take {plural(len(known), "other parameter")} of the robot as '
+                f'exact, known to {low if low == high else f"{low} to {high}"} % only: where one '
+                'is off, estimates may be off by about as much, which is more than their '
+                'intervals say')
+
+    @property
     def values(self) -> dict[str, float]:
         """Estimates by name."""
         return {one.name: one.value for one in self.estimates}
@@ -195,6 +208,7 @@ class FitResult:
             note = '  (of the recording)' if one.nuisance else ''
             lines.append(f'{one.name:<{width}}  {one.value:>11.{digits}g}  {interval:>25}  '
                          f'{one.start:>11.5g}  {one.unit}{note}')
+        lines += [self.held] * bool(self.held)
         if self.start_states:
             lines += ['', *_aligned([HEAD, *summary(self.start_states)])]
         width = max([width, *(len(quantity(c.name)) for c in self.channels)])

@@ -52,6 +52,19 @@ def test_a_loss_that_has_no_share_is_said_in_numbers() -> None:
                          'yaw rate +100\u00a0%')
 
 
+def test_a_fit_says_what_its_intervals_take_as_exact() -> None:
+    robot = lg.Husky()
+    drive = robot.simulate('spin')
+    fit = robot.identify(drive, ['wheel_damping'], progress=False)
+    known = [p for p in robot.parameters.entries if 0.0 < p.tolerance < 1.0]
+    said = f'The intervals take {len(known)} other parameters of the robot as exact, known to '
+    assert fit.result.held.startswith(f'{said}0.2 to 20 % only')
+    assert fit.result.held in str(fit).splitlines()
+    exact = [replace(p, tolerance=0.0) for p in known]
+    model = replace(fit.result.model, parameters=fit.result.model.parameters.with_entries(*exact))
+    assert replace(fit.result, model=model).held == ''
+
+
 def test_a_model_that_fits_better_has_no_loss() -> None:
     fit = lg.Husky().identify(lg.Husky(wheel_damping=1.6).simulate('s_bend'), ['wheel_damping'],
                               progress=False)
