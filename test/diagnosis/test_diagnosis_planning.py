@@ -99,16 +99,16 @@ def test_a_slower_robot_is_asked_for_less(tmp_path: Path, capsys: Any) -> None:
     assert evidence == sorted(evidence, reverse=True)
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    ([], 'either the folder'),
-    (['--effects', 'slope'], 'two different ids'),
-    (['--effects', 'slope,slope'], 'two different ids'),
-    (['--effects', 'slope,sloppe'], 'did you mean slope'),
-    (['nowhere'], 'not the folder of a diagnosis'),
+@pytest.mark.parametrize(('arguments', 'code', 'message'), [
+    ([], 2, 'either the folder'),
+    (['--effects', 'slope'], 2, 'two different ids'),
+    (['--effects', 'slope,slope'], 2, 'two different ids'),
+    (['--effects', 'slope,sloppe'], 1, 'did you mean slope'),
+    (['nowhere'], 1, 'not the folder of a diagnosis'),
 ])
-def test_bad_input_is_one_line(arguments: list[str], message: str, tmp_path: Path,
+def test_bad_input_is_one_line(arguments: list[str], code: int, message: str, tmp_path: Path,
                                capsys: Any) -> None:
-    assert run(['plan-drive', *arguments, '--out', str(tmp_path / 's.yaml')]) == 1
+    assert run(['plan-drive', *arguments, '--out', str(tmp_path / 's.yaml')]) == code
     text = capsys.readouterr().err
     assert text.startswith('error: ')
     assert text.count('\n') == 1
