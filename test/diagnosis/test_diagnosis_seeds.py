@@ -86,6 +86,9 @@ def test_smoothed_commands_are_named_and_not_a_loop_without_gains(
     found = search(evidence, start, lambda text, share: None)
     assert [one.effect for one in found.found] == [lag]
     assert found.final.point.values['command_lag'] == pytest.approx(0.3, rel=0.1)
+    # What is said of the model without it is said under the last noise.
+    plain, last = found.plain, found.evidence
+    assert plain.cost == pytest.approx(last.cost(last.residuals(plain.predicted), plain.point))
 
 
 def test_a_robot_within_its_tolerances_has_no_seeds(
