@@ -15,7 +15,7 @@ from lg_husky_sim.diagnosis.evidence.point import beginning
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.smooth_efforts import BALANCES, moved_by
-from lg_husky_sim.diagnosis.hypotheses.waves import pushed, transform, wave_numbers, waves
+from lg_husky_sim.diagnosis.hypotheses.waves import pushed, spectrum, wave_numbers, waves
 from lg_husky_sim.diagnosis.localisation import missing_efforts
 from lg_husky_sim.diagnosis.nameless import left_over, unknown_finding
 from lg_husky_sim.diagnosis.result import Verdict
@@ -100,5 +100,5 @@ def test_waves_of_a_grid_are_pushed_by_as_much_as_one_by_one() -> None:
     place, heading = random.uniform(-3.0, 3.0, (40, 2)), random.uniform(-4.0, 4.0, 40)
     push = random.standard_normal(40)
     tried = wave_numbers(6.0, 0.5, 10000)
-    assert np.allclose(transform(tried, push, place, heading),
+    assert np.allclose(spectrum(tried, push, place, heading),
                        push @ pushed(tried, place, heading), rtol=0.0, atol=1e-9)

@@ -42,7 +42,7 @@ def counted(angles: FloatArray, begin: float, factors: Sequence[float], late: Fl
 
 def shares(onset: Onset, times: FloatArray, x: FloatArray) -> FloatArray:
     """
-    Return for how much of the time from each reading to the next effects with an onset act.
+    Return for how much of the time up to each reading effects with an onset act.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def shares(onset: Onset, times: FloatArray, x: FloatArray) -> FloatArray:
     Returns
     -------
     numpy.ndarray, shape (n,)
-        From 0 to 1, of the time up to each reading; of the first one whether they act there.
+        From 0 to 1, of the time since the reading before; of the first one whether they act there.
 
     """
     match onset.kind:

@@ -57,7 +57,7 @@ class Fit:
     jacobian : numpy.ndarray, shape (n, k)
         Of the simulated readings, whitened, by the places.
     slopes : tuple of numpy.ndarray
-        The same of each drive, not whitened.
+        The same of each drive, not whitened; empty where no fit goes on from here.
     predicted : tuple of numpy.ndarray
         Simulated readings of each drive.
 

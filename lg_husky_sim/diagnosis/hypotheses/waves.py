@@ -117,7 +117,7 @@ def pushed(waves: FloatArray, place: FloatArray, heading: FloatArray) -> FloatAr
     return found
 
 
-def transform(waves: FloatArray, push: FloatArray, place: FloatArray, heading: FloatArray
+def spectrum(waves: FloatArray, push: FloatArray, place: FloatArray, heading: FloatArray
               ) -> NDArray[np.complex128]:
     """
     Return the sum of pushes times what :func:`pushed` returns, for waves on a grid.
@@ -226,7 +226,7 @@ def waves(evidence: Evidence, fit: Fit) -> tuple[Wave, ...]:
 
     total = np.zeros(len(tried), dtype=complex)
     for push, place, one in zip(pushes, places, known, strict=True):
-        total += transform(tried, push, place, one['heading'])
+        total += spectrum(tried, push, place, one['heading'])
     power = np.abs(total) ** 2
     independent = math.log(max(len(tried) / DENSITY ** 2, 1.0))
     ratios = power / levels(power, tried, span)
