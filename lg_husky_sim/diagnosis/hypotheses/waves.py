@@ -118,7 +118,7 @@ def pushed(waves: FloatArray, place: FloatArray, heading: FloatArray) -> FloatAr
 
 
 def spectrum(waves: FloatArray, push: FloatArray, place: FloatArray, heading: FloatArray
-              ) -> NDArray[np.complex128]:
+             ) -> NDArray[np.complex128]:
     """
     Return the sum of pushes times what :func:`pushed` returns, for waves on a grid.
 
