@@ -130,6 +130,15 @@ def test_help_loads_nothing_slow_or_optional() -> None:
     assert (done.returncode, done.stderr) == (0, '')
 
 
+def test_what_few_diagnoses_need_is_not_loaded_for_all() -> None:
+    ask = ('import sys\nimport lg_husky_sim.diagnosis.diagnose\n'
+           'slow = {"scipy.stats", "scipy.signal", "sympy", "matplotlib"}\n'
+           'sys.exit(", ".join(sorted(slow & set(sys.modules))) or None)')
+    done = subprocess.run([sys.executable, '-c', ask], text=True, capture_output=True,
+                          timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, '')
+
+
 def test_ctrl_c_ends_a_running_verb_with_130(verb_from: str, tmp_path: Path) -> None:
     (tmp_path / 'lg_husky_test_verb.py').write_text(
         'import click, time\n\n@click.command()\ndef command():\n'

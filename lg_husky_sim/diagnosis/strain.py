@@ -10,7 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.reporting.words import digits_apart, number
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 if TYPE_CHECKING:
     from lg_husky_sim.diagnosis.evidence.evidence import Fit
@@ -88,7 +88,7 @@ def strained(fit: Fit) -> tuple[Strained, ...]:
     found = []
     point, beyond = fit.point, setting('two_sided')
     count = sum(one.kind == 'model' for one in point.unknowns)
-    worst = float(norm.isf(norm.sf(beyond) / max(count, 1)))
+    worst = -float(ndtri(ndtr(-beyond) / max(count, 1)))
     for unknown, place, distance in zip(point.unknowns, point.places.tolist(),
                                         point.prior_residuals.tolist(), strict=True):
         bound = min(place - unknown.lower, unknown.upper - place) < 1e-6

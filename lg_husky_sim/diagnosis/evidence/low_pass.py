@@ -19,7 +19,6 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from scipy.signal import lfilter
 
 
 @jit
@@ -89,5 +88,7 @@ def followed_by_message(values: FloatArray, share: float) -> FloatArray:
     """
     if share <= 0.0 or not values.size:
         return values
+    # Most logs know no such filter, and scipy.signal takes long to load.
+    from scipy.signal import lfilter
     found: FloatArray = lfilter([1.0 - share], [1.0, -share], values, zi=[share * values[0]])[0]
     return found

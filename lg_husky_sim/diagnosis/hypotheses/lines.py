@@ -32,7 +32,7 @@ from lg_husky_sim.diagnosis.selection.screening import Projection
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 #: Balance, and the quantity over which an effort there may repeat.
 LOOKS = (('force', 'distance'), ('torque_left', 'angle'), ('torque_right', 'angle'),
@@ -120,8 +120,8 @@ def chance_of_lines(spectra: Sequence[FloatArray]) -> FloatArray:
     # A mean of n logarithms of exponential variables tells as much as 6/pi^2 n variables do.
     neighbours = 2.0 * (reach - gap) / DENSITY * 6.0 / math.pi ** 2
     number = len(spectra)
-    return np.asarray(f_distribution.logsf(
-        total / number, 2 * number, 2.0 * neighbours * number), dtype=np.float64)
+    with np.errstate(divide='ignore'):
+        return np.asarray(np.log(fdtrc(2 * number, 2.0 * neighbours * number, total / number)))
 
 
 def level(spectrum: FloatArray, reach: int, gap: int) -> FloatArray:
