@@ -48,6 +48,26 @@ def growth(z: float) -> float:
 
 
 @jit_part
+def near_phis(w: float) -> tuple[float, float]:
+    """Return phi_1 and phi_2 where no argument of several is as large as one."""
+    low = w * w
+    high = low * low
+    s4 = (((T4 + w * T5) + low * (T6 + w * T7))
+          + high * ((T8 + w * T9) + low * (T10 + w * T11))
+          + high * high * ((T12 + w * T13) + low * (T14 + w * T15)))
+    s2 = T2 + w * (T3 + w * s4)
+    return 1.0 + w * s2, s2
+
+
+@jit_part
+def far_phis(z: float) -> tuple[float, float]:
+    """Return phi_1 and phi_2 where none of several is smaller."""
+    far = 1.0 / z
+    f1 = growth(z) * far
+    return f1, (f1 - 1.0) * far
+
+
+@jit_part
 def real_phis(z: float) -> tuple[float, float, float, float]:
     """Return phi_1 to phi_4, without branches: the processor's vectors take several at once."""
     near = abs(z) < 1.0

@@ -39,6 +39,8 @@ from lg_husky_sim.simulation.arrays import (
     XI,
 )
 from lg_husky_sim.simulation.modal_kernel import (
+    far_phis,
+    near_phis,
     pair_phis,
     real_phis,
     T2,
@@ -63,11 +65,30 @@ def spread(c: int, modal: FloatArray, n_real: int, n_pairs: int, modes: FloatArr
     for i in range(n_real):
         rate, x0, r0, q1, q2 = (modal[c, RATES, i], modes[XI, i], modes[RATE, i],
                                 modes[SLOPE, i], 2.0 * modes[BEND, i])
-        for g in range(count):
-            t = lanes[GOALS, g]
-            p1, p2, p3, p4 = real_phis(rate * t)
-            lanes[values + i, g] = x0 + t * (p1 * r0 + t * (p2 * q1 + t * (p3 * q2)))
-            lanes[INTEGRALS + i, g] = t * (x0 + t * (p2 * r0 + t * (p3 * q1 + t * (p4 * q2))))
+        if q1 != 0.0 or q2 != 0.0:
+            for g in range(count):
+                t = lanes[GOALS, g]
+                p1, p2, p3, p4 = real_phis(rate * t)
+                lanes[values + i, g] = x0 + t * (p1 * r0 + t * (p2 * q1 + t * (p3 * q2)))
+                lanes[INTEGRALS + i, g] = t * (x0 + t * (p2 * r0 + t * (p3 * q1 + t * (p4 * q2))))
+        elif abs(rate) * lanes[GOALS, count - 1] < 1.0:
+            for g in range(count):
+                t = lanes[GOALS, g]
+                p1, p2 = near_phis(rate * t)
+                lanes[values + i, g] = x0 + t * (p1 * r0)
+                lanes[INTEGRALS + i, g] = t * (x0 + t * (p2 * r0))
+        elif abs(rate) * lanes[GOALS, 0] >= 1.0:
+            for g in range(count):
+                t = lanes[GOALS, g]
+                p1, p2 = far_phis(rate * t)
+                lanes[values + i, g] = x0 + t * (p1 * r0)
+                lanes[INTEGRALS + i, g] = t * (x0 + t * (p2 * r0))
+        else:
+            for g in range(count):
+                t = lanes[GOALS, g]
+                p1, p2, _, _ = real_phis(rate * t)
+                lanes[values + i, g] = x0 + t * (p1 * r0)
+                lanes[INTEGRALS + i, g] = t * (x0 + t * (p2 * r0))
     for k in range(n_real, n_real + n_pairs):
         m = k + n_pairs
         re, im = modal[c, RATES, k], modal[c, RATES, m]
