@@ -183,3 +183,12 @@ def test_a_belt_that_is_stiff_and_holds_is_none(
     fit = evidence.fit(one.point(start, {
         'belt_stiffness': stiffness, 'belt_damping': 0.3, 'belt_hold': hold}), rounds=0)
     assert is_negligible(Tried(one, fit, 50.0, evidence.count), evidence.noise.values) is nothing
+
+
+@pytest.mark.parametrize(('play', 'nothing'), [(0.02, False), (0.004, True)])
+def test_gears_without_play_are_none_whatever_turns_with_the_motor(
+        setup: tuple[Evidence, Point], play: float, nothing: bool) -> None:
+    evidence, start = setup
+    one = next(h for h in ALL if h.effect.id == 'gear_backlash')
+    fit = evidence.fit(one.point(start, {'play': play, 'rotor_share': 0.9}), rounds=0)
+    assert is_negligible(Tried(one, fit, 50.0, evidence.count), evidence.noise.values) is nothing

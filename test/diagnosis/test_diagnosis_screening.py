@@ -11,7 +11,7 @@ from lg_husky_sim.diagnosis.diagnose import diagnose
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
-from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.point import beginning, Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import entries_of, hypotheses
@@ -56,8 +56,25 @@ def test_looks_go_on_below_the_weakest_size(base: tuple[Evidence, Fit]) -> None:
     weakest = max(p.starts[-1] for h in slews for p in h.free if p.name == 'slew_forward')
     assert weakest < MILD['slew_forward']
     found = look(evidence, fit, pool)
-    assert found[0].hypothesis.label == 'command_slew:both'
+    # It is a drive ahead: whether the yaw rate is limited, too, does not show.
+    assert found[0].hypothesis.label in ('command_slew:both', 'command_slew:forward')
     assert found[0].gain > 20.0
+
+
+def test_looks_end_where_an_effect_is_too_little_to_count(
+        base: tuple[Evidence, Fit], monkeypatch: pytest.MonkeyPatch) -> None:
+    evidence, fit = base
+    sizes: list[float] = []
+    predict = Evidence.predict
+
+    def noted(self: Evidence, point: Point) -> tuple[FloatArray, ...]:
+        sizes.append(point.values['slew_yaw'])
+        return predict(self, point)
+    monkeypatch.setattr(Evidence, 'predict', noted)
+    one = next(h for h in hypotheses(fit.point.structure) if h.label == 'command_slew:yaw')
+    look(evidence, fit, [one])
+    (parameter,) = one.free
+    assert sum(size >= parameter.none_from for size in sizes) == 1
 
 
 def test_a_number_at_its_bound_takes_nothing_from_a_look(

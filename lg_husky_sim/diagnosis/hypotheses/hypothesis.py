@@ -145,6 +145,32 @@ def neutral_of(parameter: EffectParameter) -> float | None:
     return 0.0 if parameter.lower <= 0.0 <= parameter.upper else None
 
 
+def negligible(hypothesis: Hypothesis, values: Numbers, jitter: Mapping[str, float] | None = None
+               ) -> bool:
+    """
+    Return whether every number of an effect is too small, or too large, to count.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+        Whose shape says which stream may make as much.
+    values : mapping
+        Of all its free numbers.
+    jitter : mapping of str to float, optional
+        Of the streams of a log [s], which may make as much of a delay; none if not given.
+
+    """
+    shape = hypothesis.effect.shape
+
+    def least(parameter: EffectParameter) -> float:
+        of = parameter.jitter.get(shape)
+        return max(parameter.negligible, setting('late_by_jitter') * jitter[of] if of and jitter
+                   else 0.0)
+    return all(values[p.name] >= p.none_from
+               or abs(values[p.name] - (neutral_of(p) or 0.0)) < least(p)
+               for p in hypothesis.free)
+
+
 def entries_of(effect: Effect, numbers: Numbers) -> tuple[Parameter, ...]:
     """Return all parameters of an effect at given values, inside their bounds."""
     return tuple(

@@ -27,6 +27,7 @@ from lg_husky_sim.diagnosis.evidence.products import normal_matrix, row_slices
 from lg_husky_sim.diagnosis.evidence.unknowns import NEUTRAL
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import (
     Hypothesis,
+    negligible,
     neutral_of,
     Numbers,
     proportional,
@@ -323,9 +324,10 @@ class _Rung:
 
 
 def _weaker(hypothesis: Hypothesis, rungs: Sequence[_Rung]) -> list[Numbers] | None:
-    # The ladder of sizes goes on below its weakest one as long as the readings point that way
-    # and want less of it.
-    if len(rungs) < 2 or all(in_proportion(hypothesis, rungs[0].group)):
+    # The ladder of sizes goes on below its weakest one as long as that is not too little to count
+    # and the readings point that way and want less of it.
+    if (len(rungs) < 2 or all(in_proportion(hypothesis, rungs[0].group))
+            or all(negligible(hypothesis, one) for one in rungs[0].group)):
         return None
     first, second = rungs[0], rungs[1]
     if not np.all(np.isfinite(first.normal)):

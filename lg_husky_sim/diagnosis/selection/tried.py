@@ -11,10 +11,8 @@ import math
 from lg_husky_sim.diagnosis.decision.adoption import chance_of
 from lg_husky_sim.diagnosis.evidence.dispersion import accident, dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
-from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, neutral_of, Numbers
+from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis, negligible, Numbers
 from lg_husky_sim.diagnosis.selection.laws import Laws
-from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.effects import EffectParameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +47,8 @@ def numbers_of(tried: Tried) -> Numbers:
 
 
 def is_negligible(tried: Tried, jitter: Mapping[str, float]) -> bool:
-    """Return whether every number of a fitted effect is too small, or too large, to count."""
-    values, shape = tried.fit.point.values, tried.hypothesis.effect.shape
-
-    def least(parameter: EffectParameter) -> float:
-        of = parameter.jitter.get(shape)
-        return max(parameter.negligible, setting('late_by_jitter') * jitter[of] if of
-                   else 0.0)
-    return all(values[p.name] >= p.none_from
-               or abs(values[p.name] - (neutral_of(p) or 0.0)) < least(p)
-               for p in tried.hypothesis.free)
+    """Return whether a fitted effect is :func:`negligible` in a log whose stamps jitter so."""
+    return negligible(tried.hypothesis, tried.fit.point.values, jitter)
 
 
 @dataclass(frozen=True, eq=False)
