@@ -114,7 +114,9 @@ def view_of(data: ReportData) -> View | None:
     """
     if data.view is not None and data.trace(data.view.recording, data.view.channel):
         return data.view
-    rates = [trace for trace in data.traces if trace.channel not in ('x', 'y', 'heading')]
+    # No model says anything of the speeds of a pose that is too slow for a rate.
+    rates = [trace for trace in data.traces
+             if trace.predicted and trace.channel not in ('x', 'y', 'heading')]
     if not rates or not data.columns:
         return None
     gains = [(trace, _gain(trace)) for trace in rates]

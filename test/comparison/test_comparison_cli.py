@@ -316,3 +316,17 @@ def test_a_page_does_not_begin_with_the_scatter_of_a_pose() -> None:
         assert [text(found).count(said) for found in compared] == [0, 1]
     assert all(page.view is not None for page in pages)
     assert pages[1].view.channel != 'forward'  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize('interval', [0.28, 0.58])
+def test_a_pose_too_slow_for_a_speed_is_compared_as_well(
+        bag: Path, tmp_path: Path, interval: float) -> None:
+    """Nothing is predicted of speeds that are not known: they do not choose what is shown."""
+    recording = read_recording(bag)
+    pose = recording.streams['pose']
+    few = np.unique(np.searchsorted(pose.times, np.arange(
+        pose.times[0], pose.times[-1], interval)))
+    slow = replace(recording, streams={**recording.streams, 'pose': TimeSeries(
+        pose.times[few], pose.values[few], pose.names)})
+    lg.compare(slow, progress=False).save(tmp_path / 'slow')
+    assert (tmp_path / 'slow' / 'index.html').stat().st_size > 0
