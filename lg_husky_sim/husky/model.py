@@ -73,7 +73,26 @@ class Structure:
                     f'effect {effect.id} is changed at the onset, but does not exist before it')
 
     def with_effect(self, effect: Effect, onset: Onset | None = None) -> Structure:
-        """Return this structure with one effect more; a belt needs the expanded drivetrain."""
+        """
+        Return this structure with one effect more; a belt needs the expanded drivetrain.
+
+        Parameters
+        ----------
+        effect : Effect
+            To be added behind those that there are.
+        onset : Onset, optional
+            When or where it begins, if it does.
+
+        Raises
+        ------
+        ParameterError
+            If other effects begin elsewhere: a model has one onset.
+
+        """
+        if onset is not None and self.onset is not None and onset != self.onset:
+            raise ParameterError(
+                f'effect {effect.id} has the onset {onset.kind.value} = {onset.value:g}, but the '
+                f'model {self.onset.kind.value} = {self.onset.value:g}: there is one in a model')
         drivetrain = self.drivetrain
         if effect.kind.drivetrain:
             drivetrain = Drivetrain(effect.kind.drivetrain)

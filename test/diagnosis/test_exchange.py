@@ -18,6 +18,7 @@ from lg_husky_sim.diagnosis.selection.exchange import exchanged
 from lg_husky_sim.diagnosis.selection.rounds import Round
 from lg_husky_sim.diagnosis.selection.tried import Tried
 from lg_husky_sim.errors import ParameterError
+from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.threads import Threads
@@ -86,6 +87,28 @@ def test_an_effect_gives_its_place_to_a_likelier_rival_of_its_round(
         assert set(rounds[0].tried) == set(tried)
         assert fit.cost < first.cost
         assert fit.point.values['encoder_factor'] == pytest.approx(1.04, abs=0.005)
+
+
+def test_a_rival_does_not_move_the_onset_of_another_effect(
+        counting: tuple[Evidence, Point]) -> None:
+    """A model has one onset: the rival would have moved the friction's from 8 s to 3 s."""
+    evidence, plain = counting
+    pool = {h.label: h for h in hypotheses(plain.structure)}
+    scrub = pool['yaw_scrub_coulomb']
+    friction = pool['coulomb_drivetrain:left'].at(Onset(OnsetKind.TIME, 8.0, 'ahead'))
+    encoder = pool['encoder_scale:left'].at(Onset(OnsetKind.TIME, 3.0, 'ahead'))
+    base = evidence.fit(plain)
+    with_scrub, with_encoder = (evidence.fit(one.point(plain, one.starts[0]), rounds=2)
+                                for one in (scrub, encoder))
+    both = evidence.fit(friction.point(with_scrub.point, friction.starts[0]), rounds=2)
+    rounds = [
+        Round(evidence, base, tuple(Tried(one, fit, base.cost - fit.cost, evidence.count)
+                                    for one, fit in ((scrub, with_scrub),
+                                                     (encoder, with_encoder))), True, 1e-9),
+        Round(evidence, with_scrub, (Tried(friction, both, 1.0, evidence.count),), True, 1e-9)]
+    fit, _, found = exchanged(evidence, plain, both, rounds, [scrub, friction])
+    assert fit.point.structure.onset == friction.onset
+    assert {one.onset for one in found} <= {None, friction.onset}
 
 
 def test_a_side_stays_where_the_others_do_not_go_without_it(

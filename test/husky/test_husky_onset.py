@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
+from lg_husky_sim.husky.model import Structure
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.signals import FloatArray, Pose, TimeSeries
 from lg_husky_sim.simulation import rollout
@@ -119,3 +120,13 @@ def test_an_effect_that_is_there_may_change(robot: Maker) -> None:
 def test_what_was_not_there_cannot_be_there_again(robot: Maker) -> None:
     with pytest.raises(ParameterError, match='command_latency is changed at the onset'):
         robot(Effect('command_latency', late=True, again=True), onset=Onset(OnsetKind.TIME, 2.0))
+
+
+def test_a_model_has_one_onset() -> None:
+    early, late = Onset(OnsetKind.TIME, 3.0, 'rec1'), Onset(OnsetKind.PLACE_ABOVE, 2.5)
+    model = Structure().with_effect(Effect('yaw_pull', late=True), late)
+    assert model.with_effect(Effect('slope', late=True), late).onset == late
+    assert model.with_effect(Effect('slope')).onset == late
+    with pytest.raises(ParameterError, match='effect slope has the onset time = 3, but the '
+                       r'model place_above = 2\.5: there is one in a model'):
+        model.with_effect(Effect('slope', late=True), early)

@@ -87,10 +87,11 @@ def _price(evidence: Evidence, base: Fit, fit: Fit, one: Hypothesis) -> float:
 
 def _rivals(one: Round, adopted: Hypothesis, rest: Point
             ) -> list[tuple[Hypothesis, list[Numbers]]]:
-    # The next best of its round that share no number with the others.
+    # The next best of its round that share no number with the others; a model has one onset.
     taken = {p.name for e in rest.structure.effects for p in e.parameters()}
     rivals = [t for t in one.tried if t.hypothesis.effect.id != adopted.effect.id and t.score > 0.0
-              and not taken & {p.name for p in t.hypothesis.effect.parameters()}]
+              and not taken & {p.name for p in t.hypothesis.effect.parameters()}
+              and (t.hypothesis.onset is None or rest.structure.onset is None)]
     return [(t.hypothesis, [numbers_of(t), *t.hypothesis.starts])
             for t in rivals[:int(setting('exchanged'))]]
 
