@@ -102,9 +102,8 @@ class ModalDecoupling:
         if base is None:
             raise FitError('the model does not decouple into two modes: it has unequal sides, '
                            'efforts or a shaped command')
-        steps = np.maximum(0.25 * np.abs(centre), 1e-3)
         columns = []
-        for i, step in enumerate(steps):
+        for i, step in enumerate(map(_step, centre.tolist())):
             shifted = centre.copy()
             shifted[i] += step
             moved = self._one(shifted)
@@ -171,8 +170,14 @@ class ModalDecoupling:
             np.ascontiguousarray(flat[:, 24:27]))
 
 
-def can_decouple(model: HuskyModel, parameters: Parameters) -> bool:
-    """Return whether a model decouples into two modes at these parameters."""
+def can_decouple(model: HuskyModel, parameters: Parameters, free: tuple[str, ...] = ()) -> bool:
+    """Return whether a model decouples into two modes at these parameters, and as some move."""
     if len(model.regimes) != 1:
         return False
-    return _decoupled(model.regimes[0].at(dict(parameters))) is not None
+    values = dict(parameters)
+    moved = [values, *({**values, name: values[name] + _step(values[name])} for name in free)]
+    return all(_decoupled(model.regimes[0].at(one)) is not None for one in moved)
+
+
+def _step(value: float) -> float:
+    return max(0.25 * abs(value), 1e-3)

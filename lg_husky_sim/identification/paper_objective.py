@@ -180,7 +180,7 @@ class PaperObjective:
                            'has both')
         self.model, self.parameters, self.free = model, parameters, free
         self._decoupling = (ModalDecoupling(model, parameters, free)
-                            if can_decouple(model, parameters) else None)
+                            if can_decouple(model, parameters, free) else None)
         self._begins = [self._begin(track) for track in self.tracks if self.batched]
 
     def _begin(self, track: Track) -> FloatArray:

@@ -147,3 +147,13 @@ def test_an_effect_begins_between_recordings(husky: ModelFile, circle: Segment) 
     np.testing.assert_allclose(own[early], tracks[1].simulate(never)[early], atol=1e-6)
     assert not np.allclose(own, tracks[1].simulate(never))
     assert not np.allclose(own, tracks[1].simulate(always))
+
+
+def test_candidates_that_do_not_split_run_one_by_one(husky: ModelFile, circle: Segment) -> None:
+    """Sides are equal where the search begins, and unequal wherever it looks."""
+    objective = PaperObjective(compile_model(husky.structure), husky.parameters,
+                               ('side_gain_ratio',), [circle])
+    assert not objective.batched
+    found = objective(np.array([[0.95], [1.0], [1.05]]))
+    assert np.all(np.isfinite(found))
+    assert len(set(found.tolist())) == 3
