@@ -116,7 +116,8 @@ class DiagnosisResult:
         Returns
         -------
         Table
-            The last column has the change to the last model, marked as better or worse.
+            The last column has the change to the last model, marked as better or worse; none
+            where there is one model.
 
         """
         from lg_husky_sim.diagnosis.error_tables import error_tables
@@ -125,11 +126,13 @@ class DiagnosisResult:
 
         for table in error_tables(self.diagnosis, bool(self.baseline)):
             if table.held_out == held_out:
-                changes = [row[-1] for row in error_cells(table).rows]
-                return Table('', (table.title.lower(), *table.columns, 'change'), tuple(
-                    (row.name, *(row.values.get(name) for name in table.columns),
-                     change_words(one) if isinstance(one, Cell) else one)
-                    for row, one in zip(table.rows, changes, strict=True)))
+                values = {row.name: row.values for row in table.rows}
+                # Those of the report: a quantity without a number has no row.
+                rows = [(str(name), *(values[str(name)].get(one) for one in table.columns), *(
+                    change_words(one) for one in cells[len(table.columns):]
+                    if isinstance(one, Cell))) for name, *cells in error_cells(table).rows]
+                change = ('change',) if table.compared else ()
+                return Table('', (table.title.lower(), *table.columns, *change), tuple(rows))
         return Table('', (), ())
 
     def _advice(self) -> dict[str, tuple[str, ...]]:

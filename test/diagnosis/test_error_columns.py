@@ -148,6 +148,17 @@ def test_page_text_and_notebook_have_the_same_errors() -> None:
         '%', 'better', 'worse']
 
 
+def test_one_model_alone_has_no_change() -> None:
+    case: Any = SimpleNamespace(diagnosis=replace(
+        _diagnosis(fits=False), nominal={**ERRORS, 'wheel_speed_rmse': float('nan')},
+        plain=ERRORS, held_out_nominal=ERRORS, held_out_plain=ERRORS))
+    for held_out, count in ((True, 3), (False, 2)):
+        shown = DiagnosisResult(case, (), lg.Husky()).errors(held_out)
+        assert 'change' not in shown.columns
+        assert {len(row) for row in shown.rows} == {len(shown.columns)} == {2}
+        assert len(shown.rows) == count
+
+
 def test_a_model_to_which_nothing_was_added_has_no_column_of_its_own() -> None:
     said = replace(_measured(), findings=())
     assert {one.columns for one in error_tables(said)} == {('nominal', 'recalibrated')}
