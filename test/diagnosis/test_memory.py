@@ -54,6 +54,15 @@ def test_what_takes_all_of_the_room_is_kept_alone() -> None:
     memory.rows('small', never)
 
 
+def test_rows_that_two_threads_made_at_once_are_counted_once() -> None:
+    kept = Rows()
+    for _ in range(2):
+        kept.keep('a', rows())
+    kept.keep('b', rows())
+    kept.keep('c', rows())
+    assert [kept.taken(key) is not None for key in 'abc'] == [True, True, True]
+
+
 def test_drives_share_the_room_for_rows() -> None:
     one, other = Memory(), Memory()
     for key in 'ab':

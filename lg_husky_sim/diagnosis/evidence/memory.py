@@ -36,8 +36,9 @@ class Rows:
             room = setting('motions_kept') * 1e6 - rows.nbytes
             while self._rows and self._size > room:
                 self._size -= self._rows.pop(next(iter(self._rows))).nbytes
+            before = self._rows.pop(key, None)
             self._rows[key] = rows
-            self._size += rows.nbytes
+            self._size += rows.nbytes - (0 if before is None else before.nbytes)
 
 
 #: Drives are copied, and there are many in a long recording: one room for the rows of all.
