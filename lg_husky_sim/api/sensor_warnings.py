@@ -15,13 +15,15 @@ from lg_husky_sim.recording import Segment
 from lg_husky_sim.reporting.words import capitalised
 
 
-def sensor_warnings(related: Sequence[Relation], model: ModelFile, nuisance: Collection[str] = ()
-                    ) -> tuple[str, ...]:
+def sensor_warnings(parts: Sequence[Segment], related: Sequence[Relation], model: ModelFile,
+                    nuisance: Collection[str] = ()) -> tuple[str, ...]:
     """
     Say what is wrong with the sensors, or with the robot for one of the model.
 
     Parameters
     ----------
+    parts : sequence of Segment
+        The streams.
     related : sequence of Relation
         What comparing each stream with the others that see the same motion gave.
     model : ModelFile
@@ -30,7 +32,8 @@ def sensor_warnings(related: Sequence[Relation], model: ModelFile, nuisance: Col
         Unknowns of the recordings that are estimated: they are no faults either.
 
     """
-    said = [one.statement for one in faults(related) if not _accounted(one, model, nuisance)]
+    said = [one.statement for one in faults(related, parts)
+            if not _accounted(one, model, nuisance)]
     robot = 'the robot of the model' if other_robot(
         packaged().parameters, model.parameters) else 'a Husky'
     for one in differences(related, model.parameters):
@@ -54,5 +57,10 @@ def warnings_of(parts: Sequence[Segment], model: ModelFile, nuisance: Collection
     """Return the same of segments, by recording where there are several."""
     names = list(dict.fromkeys(part.recording for part in parts))
     return tuple(f'{name}: {said}' if len(names) > 1 else said for name in names
-                 for said in sensor_warnings(relations(
-                     [part for part in parts if part.recording == name]), model, nuisance))
+                 for said in _warnings(
+                     [part for part in parts if part.recording == name], model, nuisance))
+
+
+def _warnings(parts: Sequence[Segment], model: ModelFile, nuisance: Collection[str]
+              ) -> tuple[str, ...]:
+    return sensor_warnings(parts, relations(parts), model, nuisance)

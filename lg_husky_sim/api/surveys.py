@@ -166,7 +166,8 @@ def survey(recording: Recording, model: Husky | PathLike | None = None) -> Surve
     moving, excitation = _excitation(recording)
     parameters, left_open, problem = _parameters(parts, husky)
     related = relations(parts)
-    warnings = (*_unmeasured(recording), *_robot_warnings(recording, husky, related), *problem)
+    warnings = (*_unmeasured(recording), *_robot_warnings(recording, husky, parts, related),
+                *problem)
     used = set(recording.topics.values())
     return Survey(
         recording.name, recording.path, recording.duration, _streams(recording),
@@ -270,9 +271,10 @@ def _number(one: Number, digits: int) -> str:
     return f'{one.value:.{digits}f} ±{half:.{digits}f}'
 
 
-def _robot_warnings(recording: Recording, husky: Husky, related: Sequence[Relation]
+def _robot_warnings(recording: Recording, husky: Husky, parts: Sequence[rec.Segment],
+                    related: Sequence[Relation]
                     ) -> tuple[str, ...]:
-    said = list(sensor_warnings(related, husky.model))
+    said = list(sensor_warnings(parts, related, husky.model))
     fastest = max((float(np.abs(series.column('forward')).max()) for name, series in
                    recording.streams.items() if name == 'command' and len(series)), default=0.0)
     most = 1.0 / husky.parameters['command_gain']

@@ -121,7 +121,7 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
     parts = tuple(s for r in recordings for s in segments(r))
     progress('comparing the sensors', 0.01)
     related = relations(parts)
-    seen = faults(related)
+    seen = faults(related, parts)
     different = misread(seen) or differences(related, nominal.parameters)
     numbers = nominal.parameters.replacing({k: v for d in different for k, v in d.numbers.items()})
     with threads(jobs) as pool:

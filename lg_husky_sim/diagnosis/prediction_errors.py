@@ -177,10 +177,11 @@ def assess(parts: Predicted, label: str, parameters: Parameters) -> Assessment:
     Assessment
 
     """
-    related = relations([segment for segment, _ in parts])
+    stretches = [segment for segment, _ in parts]
+    related = relations(stretches)
     accused: set[str] = set()
     found = []
-    for fault in faults(related):
+    for fault in faults(related, stretches):
         accused.add(fault.stream)
         found.append(_sensor(fault))
     others = differences(related, parameters)

@@ -12,9 +12,11 @@ from typing import Any
 from lg_husky_sim.diagnosis.result import Estimate
 from lg_husky_sim.diagnosis.sensors.regression import Number
 from lg_husky_sim.diagnosis.sensors.relations import by_names, Relation
+from lg_husky_sim.diagnosis.sensors.standing import standing
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import ModelFileError
 from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.recording import Segment
 from lg_husky_sim.reporting.words import number
 from lg_husky_sim.resources import config_path
 from lg_husky_sim.yaml_files import read_yaml
@@ -89,7 +91,7 @@ def unit_of(ratio: float) -> str | None:
     return None
 
 
-def faults(found: Sequence[Relation]) -> tuple[Fault, ...]:
+def faults(found: Sequence[Relation], parts: Sequence[Segment] = ()) -> tuple[Fault, ...]:
     """
     Say which sensor is at fault.
 
@@ -97,6 +99,8 @@ def faults(found: Sequence[Relation]) -> tuple[Fault, ...]:
     ----------
     found : sequence of Relation
         Comparisons of the streams with each other.
+    parts : sequence of Segment
+        The streams themselves: what stands still has no relation to anything.
 
     Returns
     -------
@@ -107,7 +111,7 @@ def faults(found: Sequence[Relation]) -> tuple[Fault, ...]:
     every = by_names(found)
     known = {key: one for key, one in every.items()
              if one.explained > setting('least_explained')}
-    wrong = [*_signs(known), *_dead(every)]
+    wrong = [*_standing(parts), *_signs(known), *_dead(every)]
     return (*wrong, *_late(known), *(() if wrong else (
         *_gain(known), *_bias(known), *_commanded(known))))
 
@@ -164,6 +168,16 @@ def _signs(known: Known) -> list[Fault]:
                           'The robot turns to the left when its left wheels turn faster: the '
                           'wheels of the two sides are interchanged'))
     return made
+
+
+def _standing(parts: Sequence[Segment]) -> list[Fault]:
+    sides, seconds = standing(parts)
+    if not sides:
+        return []
+    wheels = 'wheels' if len(sides) == 2 else f'{sides[0]} wheels'
+    return [Fault(None, 'wheels', None, seconds / setting('relation_window'),
+                  f'The {wheels} stand still while the pose moves for {seconds:.0f} s: their '
+                  'encoders are dead, or something blocks them')]
 
 
 def _dead(every: Known) -> list[Fault]:
