@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.evidence.point import beginning, Point
 from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.result import Verdict
-from lg_husky_sim.diagnosis.selection import recalibration
+from lg_husky_sim.diagnosis.selection import recalibration, rotors
 from lg_husky_sim.diagnosis.selection.recalibration import (
     as_logged,
     at_ticks,
@@ -29,6 +29,7 @@ from lg_husky_sim.diagnosis.selection.rotors import (
     with_any_rotors,
 )
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
@@ -88,6 +89,15 @@ def test_other_rotors_are_found_and_said(pool: Threads, factor: float) -> None:
     assert fit.point.values['wheel_inertia'] == pytest.approx(factor * nominal, rel=0.1)
     said, = rotor_notes(fit.point)
     assert f'not {nominal:.2g} kg' in said
+
+
+def test_rotors_are_found_where_the_model_runs_away_at_the_nominal_numbers(
+        pool: Threads, monkeypatch: pytest.MonkeyPatch) -> None:
+    def runs_away(_: Point) -> Point:
+        raise ParameterError('it runs away')
+    monkeypatch.setattr(rotors, 'is_distorted', lambda _: True)
+    monkeypatch.setattr(rotors, 'nominal_of', runs_away)
+    assert other_rotors(*begun(4.0, pool)) is not None
 
 
 @pytest.mark.parametrize('factor', [1.0, 0.4])

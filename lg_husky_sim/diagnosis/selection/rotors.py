@@ -11,6 +11,7 @@ within its tolerance; where effects are compared, a robot of other rotors is a r
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 import math
 
@@ -18,6 +19,7 @@ from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.errors import LgHuskyError
 
 
 def with_any_rotors(point: Point) -> Point:
@@ -58,8 +60,12 @@ def other_rotors(evidence: Evidence, base: Fit) -> Fit | None:
         point.unknowns, base.point.unknowns, strict=True) if new is not old)
     if not wider:
         return None
-    starts = [point, nominal_of(point)] if is_distorted(base) else [point]
-    best = min(map(evidence.fit, starts), key=lambda fit: fit.cost)
+    fits = [evidence.fit(point)]
+    if is_distorted(base):
+        # A model with an effect that only other numbers can bear runs away there.
+        with suppress(LgHuskyError):
+            fits.append(evidence.fit(nominal_of(point)))
+    best = min(fits, key=lambda fit: fit.cost)
     by_chance = wider - math.log(setting('false_alarm_rate'))
     # What was left out can only be more.
     more = any(u.name == 'wheel_inertia' and place > u.centre for u, place in zip(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 import math
 
@@ -222,10 +223,12 @@ def _settled(evidence: Evidence, point: Point, first: Evidence) -> tuple[Evidenc
     found = [calibrated(evidence, point, 1)]
     if is_distorted(found[0][1]):
         start = nominal_of(found[0][1].point)
-        found.append(calibrated(evidence.about(start), start))
-        start = as_usual(start)
-        own, fit = calibrated(first.about(start), start)
-        found.append(_read_as(own, fit, best_reading(own, fit)))
+        # With an effect that only other numbers can bear it runs away there.
+        with suppress(LgHuskyError):
+            found.append(calibrated(evidence.about(start), start))
+            start = as_usual(start)
+            own, fit = calibrated(first.about(start), start)
+            found.append(_read_as(own, fit, best_reading(own, fit)))
     return min(found, key=lambda one: one[0].surprise(one[1]))
 
 
