@@ -91,12 +91,13 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
     # The length of a window that was not read before is one more number.
     more = _unread(evidence, best.point)
     if not more:
-        return evidence.fit(best.point, best.slopes, rounds=3)
+        return evidence.fit(best.point, best.slopes, rounds=int(setting('reading_finish')))
     known = len(best.point.unknowns)
     wider = replace(best.point, unknowns=(*best.point.unknowns, *more),
                     places=np.append(best.point.places, start_of(more)))
     slopes = [np.hstack([one, np.zeros((one.shape[0], len(more)))]) for one in best.slopes]
-    return evidence.fit(wider, slopes, rounds=3, renew=range(known, known + len(more)))
+    return evidence.fit(wider, slopes, rounds=int(setting('reading_finish')),
+                        renew=range(known, known + len(more)))
 
 
 def _raced(evidence: Evidence, begin: Fit, inflation: float, options: Sequence[Reading],
@@ -246,13 +247,19 @@ def _period(times: Sequence[FloatArray]) -> float:
     return float(np.median([np.median(np.diff(t)) for t in times]))
 
 
+def _windows() -> tuple[float, float, float, float]:
+    return (setting('tried_brief'), setting('tried_short'), setting('tried_medium'),
+            setting('tried_long'))
+
+
 def _wheel_options(evidence: Evidence, now: Reading) -> list[Reading]:
     times = [d.wheel_times for d in evidence.drives if d.wheel_times.size > 3 and not d.counted]
     if not times:
         return []
     longest = setting('longest_window')
     period = round(_period(times), 4)
-    windows = sorted({w for w in (0.005, 0.01, 0.04, 0.08, longest, period) if w <= longest})
+    brief, short, medium, long = _windows()
+    windows = sorted({w for w in (brief, short, medium, long, longest, period) if w <= longest})
     shortest = setting('shortest_window')
 
     def read(kind: WheelReading, window: float, mean: float = 0.0, smoothing: float = 0.0
@@ -262,12 +269,12 @@ def _wheel_options(evidence: Evidence, now: Reading) -> list[Reading]:
     found = [read(WheelReading.WINDOW_END, shortest)]
     found += [read(kind, window) for window in windows for kind in WheelReading]
     # Means behind a low pass: of the encoder's computer, or of what is sent.
-    for window in sorted({0.01, min(period, longest), 0.08}):
-        found += [read(WheelReading.FILTERED, lag, mean=window) for lag in (0.01, 0.04)]
+    for window in sorted({short, min(period, longest), long}):
+        found += [read(WheelReading.FILTERED, lag, mean=window) for lag in (short, medium)]
     for kind, window in ((WheelReading.WINDOW_END, shortest), (WheelReading.WINDOW_END, period),
-                         (WheelReading.WINDOW_MIDDLE, period), (WheelReading.WINDOW_END, 0.08)):
-        found += [read(kind, min(window, longest), smoothing=lag)
-                  for lag in (0.5 * period, 1.5 * period) if lag <= longest]
+                         (WheelReading.WINDOW_MIDDLE, period), (WheelReading.WINDOW_END, long)):
+        found += [read(kind, min(window, longest), smoothing=share * period) for share in (
+            setting('tried_less'), setting('tried_more')) if share * period <= longest]
     return found
 
 
@@ -276,11 +283,12 @@ def _imu_options(evidence: Evidence, now: Reading) -> list[Reading]:
     if not times:
         return []
     period = round(_period(times), 4)
+    _, short, medium, _ = _windows()
     # A low pass of a time constant delays by it and smooths with its square as variance, as a mean
     # over the root of twelve of them.
     return [replace(now, imu=place).replacing({'imu_window': window})
             for place, share in ((0.0, 1.0), (0.5, 1.0), (1.0, 1.0), (math.inf, 12.0 ** -0.5))
-            for window in (share * 0.01, share * 0.04, share * period)
+            for window in (share * short, share * medium, share * period)
             if window <= _longest(place, period)]
 
 
