@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'lg_husky_sim'
 MAX_LINES = 400
 
-BASE = {'blas', 'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'parallel', 'resources',
-        'settings', 'signals', 'threads', 'yaml_files'}
+BASE = {'allocator', 'blas', 'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'parallel',
+        'resources', 'settings', 'signals', 'threads', 'yaml_files'}
 MODEL = {'linear_graph', 'husky', 'simulation'}
 DATA = MODEL | {'recording', 'comparison', 'reporting'}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -26,6 +26,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'folders': {'errors'},
     'yaml_files': {'errors'},
     'settings': {'errors', 'resources', 'yaml_files'},
+    'allocator': set(),
     'blas': set(),
     'threads': {'blas'},
     'jit': {'errors', 'extras'},
