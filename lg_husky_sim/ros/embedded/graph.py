@@ -12,7 +12,14 @@ from cyclonedds.builtin import (
     BuiltinTopicDcpsPublication,
     BuiltinTopicDcpsSubscription,
 )
-from cyclonedds.core import DDSException, InstanceState, Policy
+from cyclonedds.core import (
+    DDSException,
+    InstanceState,
+    Policy,
+    ReadCondition,
+    SampleState,
+    ViewState,
+)
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from lg_husky_sim.ros.embedded.idl import sample_type
@@ -29,8 +36,9 @@ if TYPE_CHECKING:
     from cyclonedds.domain import DomainParticipant
 
 _INFO = 'rmw_dds_common/msg/ParticipantEntitiesInfo'
-#: Endpoints and participants that are kept at most.
-_MOST = 10_000
+#: Endpoints and participants that are taken at once.
+_MOST = 1000
+_NEWS = SampleState.NotRead | ViewState.Any | InstanceState.Any
 
 
 @dataclass(frozen=True)
@@ -58,9 +66,42 @@ def _profile(qos: Any) -> QoSProfile:
         else DurabilityPolicy.TRANSIENT_LOCAL)
 
 
+class _Ends:
+    """The endpoints of one kind that are alive; only what has changed is read again."""
+
+    def __init__(self, participant: DomainParticipant, builtin: Any) -> None:
+        """Begin to read what discovery says."""
+        self._reader = BuiltinDataReader(participant, builtin)
+        self._news = ReadCondition(self._reader, _NEWS)
+        #: Topic, type and quality of service by the endpoint's key.
+        self._alive: dict[bytes, tuple[str, str, QoSProfile]] = {}
+
+    def alive(self) -> dict[bytes, tuple[str, str, QoSProfile]]:
+        """Return those of topics of ROS."""
+        while self._news.triggered:
+            try:
+                samples: list[Any] = self._reader.take(_MOST, self._news)
+            except DDSException as error:
+                if error.code != DDSException.DDS_RETCODE_NO_DATA:
+                    raise
+                break
+            for sample in samples:
+                key = sample.key.bytes
+                # One that is gone has no more than its key.
+                if sample.sample_info.instance_state != InstanceState.Alive:
+                    self._alive.pop(key, None)
+                elif sample.sample_info.valid_data and str(sample.topic_name).startswith('rt/'):
+                    self._alive[key] = (sample.topic_name[2:], _ros_type(sample.type_name),
+                                        _profile(sample.qos))
+        return self._alive
+
+
 class Graph:
     """
     Looks at discovery; made when somebody asks for the first time.
+
+    A look takes as long as there are news, and not as there are endpoints: to read 130 of them
+    takes some 20 ms, in which a node's messages wait.
 
     Parameters
     ----------
@@ -70,17 +111,20 @@ class Graph:
 
     def __init__(self, participant: DomainParticipant) -> None:
         """Begin to read what discovery says."""
-        self._endpoints = {
-            'publisher': BuiltinDataReader(participant, BuiltinTopicDcpsPublication),
-            'subscription': BuiltinDataReader(participant, BuiltinTopicDcpsSubscription)}
+        self._ends = {'publisher': _Ends(participant, BuiltinTopicDcpsPublication),
+                      'subscription': _Ends(participant, BuiltinTopicDcpsSubscription)}
         topic = Topic(participant, 'ros_discovery_info', cast('Any', sample_type(_INFO)))
         profile = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._infos = DataReader(participant, topic, dds_qos(profile, '', writer=False))
+        self._said = ReadCondition(self._infos, _NEWS)
         self._nodes: dict[bytes, dict[bytes, tuple[str, str]]] = {}
+        self._owned: dict[bytes, tuple[str, str]] = {}
 
     def _owners(self) -> dict[bytes, tuple[str, str]]:
         # Endpoint to (name, namespace) of its node; the last word of each participant counts.
-        for sample in self._infos.take(_MOST):
+        if not self._said.triggered:
+            return self._owned
+        for sample in self._infos.take(10 * _MOST):
             if not sample.sample_info.valid_data:
                 continue
             try:
@@ -92,25 +136,16 @@ class Graph:
                 for gid in (*node.reader_gid_seq, *node.writer_gid_seq):
                     owned[bytes(gid.data)] = (node.node_name, node.node_namespace)
             self._nodes[bytes(message.gid.data)] = owned
-        return {gid: node for owned in self._nodes.values() for gid, node in owned.items()}
-
-    def _alive(self, kind: str) -> list[Any]:
-        try:
-            samples = self._endpoints[kind].read(_MOST)
-        except DDSException as error:
-            if error.code == DDSException.DDS_RETCODE_NO_DATA:
-                return []
-            raise
-        return [sample for sample in samples
-                if sample.sample_info.instance_state == InstanceState.Alive
-                and str(sample.topic_name).startswith('rt/')]
+        self._owned = {gid: node for owned in self._nodes.values()
+                       for gid, node in owned.items()}
+        return self._owned
 
     def topics(self) -> list[tuple[str, list[str]]]:
         """Return each topic's name with its types, in order of the names."""
         found: dict[str, set[str]] = {}
-        for kind in self._endpoints:
-            for sample in self._alive(kind):
-                found.setdefault(sample.topic_name[2:], set()).add(_ros_type(sample.type_name))
+        for ends in self._ends.values():
+            for name, kind, _ in ends.alive().values():
+                found.setdefault(name, set()).add(kind)
         return [(name, sorted(found[name])) for name in sorted(found)]
 
     def endpoints(self, kind: str, topic: str) -> list[TopicEndpointInfo]:
@@ -127,10 +162,6 @@ class Graph:
         """
         owners = self._owners()
         unknown = ('_NODE_NAME_UNKNOWN_', '_NODE_NAMESPACE_UNKNOWN_')
-        ends = []
-        for sample in self._alive(kind):
-            if sample.topic_name == f'rt{topic}':
-                name, namespace = owners.get(sample.key.bytes, unknown)
-                ends.append(TopicEndpointInfo(
-                    name, namespace, _ros_type(sample.type_name), _profile(sample.qos)))
-        return ends
+        return [TopicEndpointInfo(*owners.get(gid, unknown), of, profile)
+                for gid, (name, of, profile) in self._ends[kind].alive().items()
+                if name == topic]
