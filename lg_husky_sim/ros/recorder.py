@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 import shutil
 import time
@@ -13,7 +13,7 @@ from typing import Any
 from lg_husky_sim.errors import RecordingError
 from lg_husky_sim.ros import api
 from lg_husky_sim.ros.bag_writer import bag_writer
-from lg_husky_sim.ros.graph import publishers
+from lg_husky_sim.ros.graph import Endpoint, publishers
 from lg_husky_sim.ros.settings import Settings
 from lg_husky_sim.ros.tool import Elapsed, Ended, LOOK, Say, Tool
 
@@ -24,6 +24,11 @@ _DEPTH = 1000
 LOSES = 1.0
 #: Time between two lines of running counts [s].
 EVERY = 5.0
+#: Most of a recorder's time that goes into looks at who publishes; messages wait meanwhile.
+SHARE = 0.05
+#: A publisher's clock that is further from this machine's is another clock [s]. Whoever reads
+#: recordings leaves clocks alone that are closer than this (``SKEW_NS`` of recording/clock.py).
+SAME_CLOCK = 0.5
 
 
 def recorded_topics(settings: Settings) -> dict[str, str]:
@@ -44,9 +49,9 @@ def recorded_topics(settings: Settings) -> dict[str, str]:
     return {topic: kind for topic, kind in topics.items() if api.message_type(kind) is not None}
 
 
-def adapted(node: api.Node, topic: str, kind: str) -> tuple[bool, bool]:
+def adapted(ends: Iterable[Endpoint], kind: str) -> tuple[bool, bool]:
     """
-    Return the quality of service that gets the most from all who publish a type on a topic.
+    Return the quality of service that gets the most from all publishers of a type.
 
     Returns
     -------
@@ -54,8 +59,27 @@ def adapted(node: api.Node, topic: str, kind: str) -> tuple[bool, bool]:
         Reliable unless somebody is not; what was said before if everybody keeps it.
 
     """
-    ends = [end for end in publishers(node, topic) if end.kind == kind]
+    ends = [end for end in ends if end.kind == kind]
     return all(end.reliable for end in ends), bool(ends) and all(end.latched for end in ends)
+
+
+def moment(sent: int, received: int) -> int:
+    """
+    Return when a message was said that does not tell it in a header [ns].
+
+    Messages that a busy machine receives in bursts were not sent in bursts: the moment of the
+    sending counts, where it is by the same clock. What was kept for late joiners, and what is by
+    another clock, counts as received.
+
+    Parameters
+    ----------
+    sent : int
+        By the publisher's clock, as the middleware tells it [ns]; any number where it does not.
+    received : int
+        By this machine's clock [ns].
+
+    """
+    return sent if abs(received - sent) <= SAME_CLOCK * 1e9 else received
 
 
 def _simulated(node: api.Node) -> Callable[[], int]:
@@ -70,8 +94,9 @@ class Recorder:
     Parameters
     ----------
     node : api.Node
-        Whoever spins it makes the recording go on. Messages are stamped by the system's clock,
-        or with its ``use_sim_time`` by /clock.
+        Whoever spins it makes the recording go on. Messages are stamped by the system's clock
+        when they are received, those without a header when they were sent (:func:`moment`); with
+        the node's ``use_sim_time`` all by /clock when they are received.
     path : Path
         Folder to make; must not exist yet.
     topics : mapping of str to str
@@ -92,7 +117,11 @@ class Recorder:
         self.path = path
         self.counts: dict[str, int] = {}
         self._node = node
-        self._now = _simulated(node) if node.get_parameter('use_sim_time').value else time.time_ns
+        simulated = node.get_parameter('use_sim_time').value
+        self._now = _simulated(node) if simulated else time.time_ns
+        self._headless = set[str]() if simulated else {
+            kind for kind in topics.values() if not hasattr(api.message_type(kind)(), 'header')}
+        self._next_look = 0.0
         self._writer: Any = bag_writer(path, storage)
         self._kinds = {node.resolve_topic_name(topic): kind for topic, kind in topics.items()}
         self._heard: dict[str, tuple[tuple[bool, bool], Any]] = {}
@@ -116,17 +145,26 @@ class Recorder:
             self._node, self._kinds[topic], topic, self._writing(topic), profile))
 
     def _look(self) -> None:
+        if time.monotonic() < self._next_look:
+            return
+        # Of the processor's time: a look that others interrupt is not put off for that.
+        begun = time.thread_time()
         for topic, kind in self._kinds.items():
             quality, subscription = self._heard[topic]
-            wanted = adapted(self._node, topic, kind)
-            if wanted != quality and publishers(self._node, topic):
+            ends = publishers(self._node, topic)
+            wanted = adapted(ends, kind)
+            if ends and wanted != quality:
                 self._node.destroy_subscription(subscription)
                 self._subscribe(topic, wanted)
+        self._next_look = time.monotonic() + (time.thread_time() - begun) / SHARE
 
-    def _writing(self, topic: str) -> Callable[[bytes], None]:
-        def write(raw: bytes) -> None:
+    def _writing(self, topic: str) -> Callable[[bytes, int], None]:
+        headless = self._kinds[topic] in self._headless
+
+        def write(raw: bytes, sent: int) -> None:
             if self._writer is not None:
-                self._writer.write(topic, self._now(), raw)
+                now = self._now()
+                self._writer.write(topic, moment(sent, now) if headless else now, raw)
                 self.counts[topic] += 1
         return write
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import inspect
 import time
 from typing import Any, TYPE_CHECKING
 import uuid
@@ -68,17 +69,33 @@ class Publisher:
         return len(self.writer.get_matched_subscriptions())
 
 
+def _takes_two(callback: Callable[..., None]) -> bool:
+    # As rclpy finds out.
+    try:
+        signature = inspect.signature(callback)
+    except (TypeError, ValueError):
+        return False
+    for count in (1, 2):
+        try:
+            signature.bind(*range(count))
+        except TypeError:
+            continue
+        return count == 2
+    return False
+
+
 class Subscription:
     """Hands the messages of a topic to a callback."""
 
     def __init__(self, context: Context, msg_type: type[Message], topic: str,
-                 callback: Callable[[Any], None], qos: QoSProfile) -> None:
+                 callback: Callable[..., None], qos: QoSProfile) -> None:
         """Make the reader."""
         self.topic_name = topic
         self.qos_profile = qos
         self.malformed = 0
         self._name = msg_type.__msgtype__
         self._callback = callback
+        self._informed = _takes_two(callback)
         self.reader = DataReader(
             context.participant, context.topic(f'rt{topic}', self._name),
             dds_qos(qos, f'typehash={type_hash(self._name)};', writer=False))
@@ -94,7 +111,13 @@ class Subscription:
                 except SerdeError:
                     self.malformed += 1
                     continue
-                self._callback(message)
+                if self._informed:
+                    # As rmw_cyclonedds, which does not tell when a sample was received.
+                    self._callback(message, {
+                        'source_timestamp': sample.sample_info.source_timestamp,
+                        'received_timestamp': 0})
+                else:
+                    self._callback(message)
                 count += 1
         return count
 

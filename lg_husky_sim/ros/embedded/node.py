@@ -155,9 +155,14 @@ class Node:
         return publisher
 
     def create_subscription(self, msg_type: type[Message], topic: str,
-                            callback: Callable[[Any], None],
+                            callback: Callable[..., None],
                             qos_profile: QoSProfile | int) -> Subscription:
-        """Return a subscription; a number as quality of service is the depth."""
+        """
+        Return a subscription; a number as quality of service is the depth.
+
+        A callback of two arguments receives what is known of a message as well, such as its
+        ``source_timestamp`` [ns].
+        """
         subscription = Subscription(self.context, msg_type, self._names.expand(topic), callback,
                                     as_profile(qos_profile))
         self._subscriptions.append(subscription)
