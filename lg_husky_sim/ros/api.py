@@ -153,9 +153,7 @@ def service_type(name: str) -> Any:
 
 def parameter(name: str, value: object) -> Parameter:
     """Return a parameter of the type that the value has."""
-    if not HAVE_RCLPY:
-        return Parameter.of(name, value)
-    return Parameter(name, value=value)  # type: ignore[call-arg]
+    return Parameter(name, value=value)
 
 
 def parameter_overrides(node: Node) -> dict[str, Parameter]:

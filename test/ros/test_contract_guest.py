@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -52,6 +54,39 @@ husky.destroy_node()
 mine.destroy_node()
 rclpy.try_shutdown()
 """
+
+
+#: What the user of docs/ros.md brings along.
+BROUGHT = """
+from lg_husky_sim.ros import api
+my_node = api.Node('mine')
+api.steady_timer(my_node, 0.02, lambda: husky.engine.total > 5 and api.leave(my_node))
+"""
+PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'ros.md'
+
+
+@pytest.mark.parametrize('imports', ['rclpy', 'api'])
+def test_the_page_of_the_node_says_how_it_lives_in_a_process(imports: str) -> None:
+    """Its snippet imports rclpy, and nothing said what to import where that is not installed."""
+    if imports == 'rclpy' and not api.HAVE_RCLPY:
+        pytest.skip('rclpy is not installed')
+    chapter = PAGE.read_text(encoding='utf-8').partition('## In your own process')[2]
+    snippet = chapter.partition('```python\n')[2].partition('```')[0]
+    if imports == 'api':
+        lines = re.findall(r'`((?:import|from) [^`]*)`', chapter.partition('\n## ')[0])
+        snippet = '\n'.join((*lines, *snippet.splitlines()[3:]))
+        assert '\nfrom lg_husky_sim.ros.simulation_node' in snippet
+        assert 'from rclpy' not in snippet
+    before, made, rest = snippet.partition('executor = ')
+    program, run, _ = (before + BROUGHT + made + rest).partition('executor.spin()')
+    with isolated_domain():
+        done = subprocess.run(
+            [sys.executable, '-c', f'{program}try:\n    {run}\n'
+             'except api.ExternalShutdownException:\n    pass\n'
+             'print(husky.settings.preset, husky.engine.total > 5)\n'
+             'husky.destroy_node()\nmy_node.destroy_node()\napi.try_shutdown()\n'],
+            text=True, capture_output=True, timeout=120.0, check=False)
+    assert done.stdout == 'clearpath_jazzy True\n', done.stderr
 
 
 @pytest.mark.skipif(not api.HAVE_RCLPY, reason='rclpy is not installed: its executors are not '

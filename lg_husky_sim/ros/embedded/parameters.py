@@ -66,15 +66,50 @@ def parameter_type(value: object) -> ParameterType:
                     'of these')
 
 
-@dataclass(frozen=True)
+def _agree(type_: ParameterType, value: object) -> bool:
+    # Of an empty list nothing tells of what it could be one.
+    if isinstance(value, (list, tuple, bytes)) and not value:
+        return type_ >= ParameterType.BYTE_ARRAY
+    return parameter_type(value) == type_
+
+
+@dataclass(frozen=True, init=False)
 class Parameter:
-    """A name with a value."""
+    """
+    A name with a value.
+
+    Parameters
+    ----------
+    name : str
+    type_ : ParameterType, optional
+        That of the value if not given.
+    value : object, optional
+        None: not set.
+
+    Raises
+    ------
+    TypeError
+        If no parameter can hold the value, or the type is none.
+    ValueError
+        If the value is of another type.
+
+    """
 
     name: str
     type_: ParameterType
     value: Any
 
     Type = ParameterType
+
+    def __init__(self, name: str, type_: ParameterType | None = None, value: Any = None) -> None:
+        """Check the value."""
+        kind = parameter_type(value) if type_ is None else type_
+        if not isinstance(kind, ParameterType):
+            raise TypeError(f'type {kind!r} of parameter {name!r} is no ParameterType')
+        if not _agree(kind, value):
+            raise ValueError(f'parameter {name!r} = {value!r} is not {kind.name}')
+        for field, content in (('name', name), ('type_', kind), ('value', value)):
+            object.__setattr__(self, field, content)
 
     @classmethod
     def of(cls, name: str, value: object) -> Parameter:

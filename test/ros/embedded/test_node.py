@@ -321,6 +321,21 @@ def test_time_arithmetic() -> None:
     assert Duration(nanoseconds=-1).to_msg().nanosec == 999_999_999
 
 
+def test_a_parameter_takes_its_type_from_its_value() -> None:
+    """As rclpy's; a user's own process ended with a TypeError without ROS 2."""
+    assert Parameter('preset', value='paper') == Parameter.of('preset', 'paper')
+    assert Parameter('empty').type_ == Parameter.Type.NOT_SET
+    assert Parameter('rates', Parameter.Type.DOUBLE_ARRAY, []).value == []
+    assert Parameter('rate', Parameter.Type.DOUBLE, 2.0).type_ == Parameter.Type.DOUBLE
+    with pytest.raises(ValueError, match="parameter 'rate' = 2 is not DOUBLE"):
+        Parameter('rate', Parameter.Type.DOUBLE, 2)
+    with pytest.raises(TypeError, match='is no parameter value'):
+        Parameter('rate', value={})
+    odd: Any = 'paper'
+    with pytest.raises(TypeError, match="type 'paper' of parameter 'preset' is no ParameterType"):
+        Parameter('preset', odd)
+
+
 def test_a_parameter_of_an_unknown_type_is_refused() -> None:
     """Anybody's request of such a one ended the node."""
     store = ParameterStore({})
