@@ -97,7 +97,8 @@ class SimNode(Node):
         self._neighbours = Neighbours(self, self.settings)
         if started is not None:
             took = time.monotonic() - started
-            log.info(f'running with preset {self.settings.preset} at '
+            model = f' and model {self.settings.model}' if self.settings.model else ''
+            log.info(f'running with preset {self.settings.preset}{model} at '
                      f'{self.settings.rate:g} Hz, {took:.2f} s after the start')
 
     def _subscribe(self) -> None:

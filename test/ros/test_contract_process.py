@@ -299,6 +299,20 @@ def test_the_first_log_line_names_the_backend(probe: Probe, start: Start) -> Non
     assert 'discovery range LOCALHOST' in line
 
 
+@pytest.mark.parametrize('given', [True, False])
+def test_the_log_names_the_model_that_runs(
+        probe: Probe, start: Start, tmp_path: Path, given: bool) -> None:
+    """With a model file the log said `running with preset paper`, and nothing of the file."""
+    from lg_husky_sim import Husky
+    path, topic = tmp_path / 'mine.yaml', f'/named_{given}/odom'
+    Husky().save(str(path))
+    husky = start(odometry_topic=topic, **({'model': path} if given else {}))
+    husky.ready(probe.listen('nav_msgs/msg/Odometry', topic))
+    assert probe.until(lambda: 'running with' in husky.node.log())
+    said = f'preset paper and model {path} at' if given else 'preset paper at'
+    assert f'running with {said} 50 Hz, ' in husky.node.log()
+
+
 def test_a_changed_model_file_runs_on_without_a_jump(
         probe: Probe, start: Start, tmp_path: Path) -> None:
     """A model file is loaded live: the pose goes on, the behaviour changes; bad files do not."""
