@@ -39,7 +39,7 @@ def toured(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     lines = [line for line in tour() if not line.startswith('./run sim_node')]
     assert len(lines) == len(tour()) - 1
     done = subprocess.run(['bash', '-e'], input='\n'.join(lines), cwd=folder, text=True,
-                          capture_output=True, timeout=500, check=False,
+                          capture_output=True, timeout=1200, check=False,
                           env={**os.environ, 'OMP_NUM_THREADS': '1'})
     assert done.returncode == 0, done.stderr[-3000:]
     return folder, done.stdout
