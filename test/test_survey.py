@@ -126,6 +126,22 @@ def test_a_sensor_that_falls_silent_before_the_commands_is_named(drive: lg.Recor
     assert any(one.startswith('Stream wheels ends') for one in part.info().warnings)
 
 
+@pytest.mark.parametrize(('served', 'bunches'), [(0.0, False), (0.34, True)])
+def test_commands_that_were_stamped_in_bunches_are_named(
+        drive: lg.Recording, served: float, bunches: bool) -> None:
+    """A recorder looked for them three times a second: each look stamped all that had come."""
+    times = np.arange(drive.command.times[0], drive.command.times[-1], 0.05)
+    held = np.searchsorted(drive.command.times, times, side='right') - 1
+    if served:
+        times = served * np.ceil(times / served) + 1e-5 * np.arange(times.size)
+    else:
+        times = times + np.random.default_rng(1).uniform(-0.02, 0.02, times.size)
+    commands = TimeSeries(times, drive.command.values[held], drive.command.names)
+    said = [one for one in with_streams(drive, command=commands).info().warnings
+            if one.startswith('Stream command comes in bunches: ')]
+    assert len(said) == bunches
+
+
 def test_a_drive_faster_than_any_husky_is_named() -> None:
     times = np.arange(0.0, 15.0, 0.05)
     fast = lg.Husky().simulate((times, 3.0 + 0.0 * times, 0.0 * times))

@@ -281,8 +281,28 @@ def _robot_warnings(recording: Recording, husky: Husky, parts: Sequence[rec.Segm
     if fastest > limits()['overdriven'] * most:
         said.append(f'{fastest:.2f} m/s are commanded, but the model has its whole supply at '
                     f'{most:.2f} m/s (1/command_gain): it may be of another robot')
-    said += _silences(recording)
+    said += [*_silences(recording), *_bunches(recording)]
     return tuple(said)
+
+
+def _bunches(recording: Recording) -> list[str]:
+    # Whoever stamps messages when it comes to read them says nothing of when they were sent.
+    said = []
+    for name in CONTINUOUS:
+        series: TimeSeries | None = recording.streams.get(name)
+        if series is None or len(series) < 2:
+            continue
+        steps = np.diff(series.times)
+        steps = steps[steps < max(rec.recording.DEFAULT_GAP, float(np.median(steps)))]
+        if not steps.size:
+            continue
+        share = float(np.mean(steps < limits()['bunched_interval'] * float(np.mean(steps))))
+        if share > limits()['bunched_share']:
+            said.append(f'Stream {name} comes in bunches: {100.0 * share:.0f} % of its stamps '
+                        f'follow the one before within {limits()["bunched_interval"]:g} of the '
+                        'mean interval; they say when messages were received, not when they '
+                        'were sent, and a fit takes them for that')
+    return said
 
 
 def _silences(recording: Recording) -> list[str]:
