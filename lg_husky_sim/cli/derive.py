@@ -26,15 +26,16 @@ PAPER = ('simplified', 'expanded')
 @click.option('--parameters', 'by_parameter', is_flag=True,
               help="Write the parameters' expressions instead of the elements' names.")
 @click.option('--latex', is_flag=True, help='Write LaTeX instead of plain text.')
-@click.option('--picture', type=click.Path(path_type=Path), metavar='FILE',
-              help='Draw the graph into FILE (.svg, .png or .pdf).')
+@click.option('--picture', 'pictures', multiple=True, type=click.Path(path_type=Path),
+              metavar='FILE',
+              help='Draw the graph into FILE (.svg, .png or .pdf); may be given several times.')
 @click.option('--export', 'exports', multiple=True, type=click.Path(path_type=Path),
               metavar='FILE',
               help='Write numeric A, B, C and D: .json, .mat, .npz, .h (C), .tex or .py '
                    '(python-control, scipy); may be given several times.')
 @spoken()
 def command(graph: str | None, model: str | None, outputs: tuple[str, ...],
-            by_parameter: bool, latex: bool, picture: Path | None,
+            by_parameter: bool, latex: bool, pictures: tuple[Path, ...],
             exports: tuple[Path, ...], say: Output) -> None:
     """
     Derive the state-space model of a linear graph and show every step.
@@ -48,8 +49,11 @@ def command(graph: str | None, model: str | None, outputs: tuple[str, ...],
     """
     import json
 
+    from lg_husky_sim.linear_graph.drawing import check_picture
     from lg_husky_sim.linear_graph.export import check_export, json_text
 
+    for path in pictures:
+        check_picture(path)
     for path in exports:
         check_export(path)
     if graph and model:
@@ -57,14 +61,14 @@ def command(graph: str | None, model: str | None, outputs: tuple[str, ...],
         raise misused(message)
     derived = _load(graph or model or PAPER[0], outputs)
     text = derived.latex(by_parameter) if latex else derived.text(by_parameter)
-    if picture is not None:
-        derived.draw(picture)
+    for path in pictures:
+        derived.draw(path)
     for path in exports:
         derived.export(path)
     data = json.loads(json_text(derived.numeric(), derived.name, derived.values)) if (
         say.as_json) else None
     say.result(text, data)
-    for path in (*([picture] if picture else []), *exports):
+    for path in (*pictures, *exports):
         if not say.quiet:
             click.echo(f'{path} written', err=True)
 

@@ -194,9 +194,7 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
 
     """
     path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise GraphError(f'picture {str(path)!r} must end in {", ".join(FORMATS)}')
-    check_marked(path, MARK)
+    check_picture(path)
     require('matplotlib', 'draw graphs')
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -222,3 +220,20 @@ def save_picture(graph: LinearGraph, path: str | Path, *, title: str = '',
         figure.savefig(draft, dpi=150, metadata=metadata[path.suffix.lower()])
         os.replace(draft, path)
     return path
+
+
+def check_picture(path: Path) -> None:
+    """
+    Check that a graph can be drawn into a file of this name.
+
+    Raises
+    ------
+    GraphError
+        If the ending is unknown.
+    SettingsError
+        If something else than such a picture is there.
+
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise GraphError(f'picture {str(path)!r} must end in {", ".join(FORMATS)}')
+    check_marked(path, MARK)

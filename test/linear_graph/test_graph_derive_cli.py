@@ -70,6 +70,15 @@ def test_every_example_is_derived(name: str, capsys: pytest.CaptureFixture[str])
     assert 'State-space model' in said
 
 
+def test_every_picture_that_is_asked_for(tmp_path: Path,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    pictures = [str(tmp_path / 'husky.svg'), str(tmp_path / 'husky.png')]
+    wanted = [word for path in pictures for word in ('--picture', path)]
+    assert run(['derive', *wanted]) == 0
+    assert capsys.readouterr().err == ''.join(f'{path} written\n' for path in pictures)
+    assert all(Path(path).stat().st_size for path in pictures)
+
+
 def test_a_model_file_and_a_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from lg_husky_sim.resources import config_path
     picture = tmp_path / 'husky.svg'
@@ -85,6 +94,7 @@ def test_a_model_file_and_a_picture(tmp_path: Path, capsys: pytest.CaptureFixtur
     (['--output', 'v(M_G)'],
      "error: unknown output: no branch 'M_G' in the graph; did you mean 'M_H'"),
     (['--picture', 'x.bmp'], "error: picture 'x.bmp' must end in .svg, .png, .pdf"),
+    (['--picture', 'x.svg', '--picture', 'x.bmp'], "error: picture 'x.bmp' must end in .svg"),
 ])
 def test_bad_input_is_one_line_and_exit_code_1(
         arguments: list[str], message: str, capsys: pytest.CaptureFixture[str],
