@@ -13,6 +13,9 @@ from lg_husky_sim.linear_graph.expressions import names_in
 if TYPE_CHECKING:
     from lg_husky_sim.linear_graph.graph import Edge, LinearGraph, Node
 
+USUAL_GROUNDS = ('0', 'gnd', 'grnd', 'ground', 'earth', 'reference')
+"""Names that ground often has, in small letters."""
+
 
 def check_graph(graph: LinearGraph) -> None:
     """
@@ -127,7 +130,8 @@ def _check_grounding(graph: LinearGraph) -> None:
         if all(ground not in (edge.tail, edge.head) for edge in edges):
             raise GraphError(
                 f'the {domain.value} domain has no ground: no branch touches node {ground[1]!r}; '
-                f'connect one of {", ".join(edge.name for edge in edges[:6])} to it')
+                f'connect one of {", ".join(edge.name for edge in edges[:6])} to it, or say which '
+                f'node is ground: {_usual_ground(graph, domain) or "ground: NODE"}')
         reached = Forest()
         for edge in edges:
             reached.join(edge.tail, edge.head)
@@ -137,7 +141,20 @@ def _check_grounding(graph: LinearGraph) -> None:
                 raise GraphError(
                     f'node {edge.tail[1]!r} floats: {", ".join(part[:6])} '
                     f'{"has" if len(part) == 1 else "have"} no way to the '
-                    f'{domain.value} ground {ground[1]!r}; connect one of them to it')
+                    f'{domain.value} ground {ground[1]!r}; connect one of them to it'
+                    f'{_other_ground(graph, domain)}')
+
+
+def _usual_ground(graph: LinearGraph, domain: Domain) -> str:
+    """Return what to write where a node has a usual name of ground and is none; '' for none."""
+    names = (name for kind, name in graph.nodes
+             if kind is domain and name != graph.ground_of(domain)[1])
+    return next((f'ground: {name}' for name in names if name.lower() in USUAL_GROUNDS), '')
+
+
+def _other_ground(graph: LinearGraph, domain: Domain) -> str:
+    usual = _usual_ground(graph, domain)
+    return f', or write {usual} if that node is ground' if usual else ''
 
 
 def _check_masses(graph: LinearGraph) -> None:
@@ -199,7 +216,7 @@ def _check_through_cuts(graph: LinearGraph) -> None:
                     f'through sources {", ".join(cut)} alone connect node {node[1]!r}, so they '
                     'may contradict each other')
                 raise GraphError(f'{sources_say} and the across variable is open; put another '
-                                 'element in parallel')
+                                 f'element in parallel{_other_ground(graph, domain)}')
 
 
 def _check_open_ends(graph: LinearGraph) -> None:

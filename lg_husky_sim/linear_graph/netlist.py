@@ -239,7 +239,8 @@ def _element(name: str, given: Any, values: dict[str, float], units: dict[str, s
     _known(entry, f'element {name!r}', ONE_PORT['properties'])
     kind, domain = ELEMENTS[what]
     if 'from' not in entry:
-        _node(entry, 'from', None)
+        pushes = f'write from: {_ground_of(ground, domain)} for a source that pushes from there'
+        _node(entry, 'from', None, pushes if kind in SOURCES and 'to' in entry else '')
     form = None
     if 'form' in entry:
         forms = {form.value: form for form in Form}
@@ -342,12 +343,13 @@ def _ground_of(ground: Ground, domain: Domain) -> str:
     return ground if isinstance(ground, str) else ground.get(domain, GROUND)
 
 
-def _node(entry: Mapping[str, Any], key: str, default: str | None) -> str:
+def _node(entry: Mapping[str, Any], key: str, default: str | None, remedy: str = '') -> str:
     given = entry.get(key, default)
     if isinstance(given, int) and not isinstance(given, bool):
         return str(given)
     if key not in entry and given is None:
-        raise ModelFileError(f'{key} is missing; it names a node' + (
+        usual = 'it names the node that the branch leaves'
+        raise ModelFileError(f'{key} is missing; {remedy or usual}' + (
             ' (there is form: in place of from:)' if key == 'from' and 'form' in entry else ''))
     if not isinstance(given, str):
         raise ModelFileError(f'{key}: {given!r} is no text; put the name of the node in quotes')

@@ -84,7 +84,7 @@ def test_forms_and_grounds() -> None:
     ('value: k_t', 'value: k_tt', r"parameter 'k_t' is used by no element; did you mean 'k_tt'"),
     ('N·m/A', 'rad/(N·m·s)', r"unit of 'motor': k_t with k_t .* does not fit a transformer"),
     ('2 mH', '2 mF', r"unit of 'L': L with L \[mF\] does not fit an electrical T-type"),
-    ('from: shaft, value: 1e', 'value: 1e', r"element 'J': from is missing; it names a node"),
+    ('from: shaft, value: 1e', 'value: 1e', r"element 'J': from is missing; it names the node"),
     ('outputs', 'output', r"the file: unknown key 'output'; did you mean 'outputs'"),
     ('[omega(J), i', '[omega(K), i', r"no branch 'K' in the graph"),
     ('0.5 ohm', '0.5*', r"branch 'R': expression '0.5\*' cannot be read"),

@@ -23,7 +23,34 @@ NETS: dict[str, tuple[str, str]] = {
     'element on': ('elements: {on: {is: resistor, from: a}}',
                    'key True must be a text; put it in quotes'),
     'form for from': ('elements: {r: {is: resistor, form: a}}',
-                      r'from is missing; it names a node \(there is form: in place of from:\)'),
+                      r'from is missing; it names the node that the branch leaves \(there is '
+                      r'form: in place of from:\)'),
+    'source without from': (
+        'elements: {F: {is: force source, to: m}, m: {is: mass, from: m, value: 1}}',
+        "element 'F': from is missing; write from: ground for a source that pushes from there$"),
+    'source without either node': (
+        'elements: {V: {is: voltage source}}', 'it names the node that the branch leaves$'),
+    'source without from, another ground': (
+        'ground: wall\nelements: {F: {is: force source, to: m}, m: {is: mass, from: m}}',
+        'write from: wall for a source'),
+    'ground called gnd': (
+        'elements: {V: {is: voltage source, from: a, to: gnd}, '
+        'R: {is: resistor, from: a, to: gnd}}',
+        "no branch touches node 'ground'; connect one of V, R to it, or say which node is ground: "
+        'ground: gnd$'),
+    'ground called 0': (
+        'elements: {V: {is: voltage source, from: a, to: 0}, R: {is: resistor, from: a, to: 0}}',
+        'or say which node is ground: ground: 0$'),
+    'ground of another name': (
+        'elements: {V: {is: voltage source, from: a, to: b}, R: {is: resistor, from: a, to: b}}',
+        'or say which node is ground: ground: NODE$'),
+    'a second ground': (
+        'elements: {F: {is: force source, from: GND, to: m}, m: {is: mass, from: m}}',
+        "connects node 'GND', .* in parallel, or write ground: GND if that node is ground$"),
+    'a ground that floats': (
+        'elements: {F: {is: force source, from: gnd, to: m}, b: {is: damper, from: m, to: gnd}, '
+        'm: {is: mass, from: n}}',
+        "node 'gnd' floats: .* to it, or write ground: gnd if that node is ground$"),
     'parameter with an expression': (
         'parameters: {d: 2*c}\nelements: {r: {is: resistor, from: a, value: d}}',
         r"parameter d = '2\*c' must be a number; expressions stand in the values of elements"),
