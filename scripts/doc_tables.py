@@ -67,6 +67,14 @@ def manoeuvres() -> str:
         for one in builtin_manoeuvres().values()))
 
 
+def laws() -> str:
+    """Return the named laws of a linear graph: formula, arguments, parameters, meaning."""
+    from lg_husky_sim.linear_graph.laws import LAWS, listed
+    return table(('law', 'formula', '`of`', '`parameters`', 'what it is'), (
+        (f'`{name}`', f'`{law.expression}`', listed('z', law.arguments),
+         listed('p', law.parameters), law.about) for name, law in LAWS.items()))
+
+
 def rooms() -> str:
     """Return the packages of the diagnosis: purpose, modules, rounded lines."""
     import ast
@@ -86,7 +94,7 @@ def rooms() -> str:
 TABLES: Mapping[str, tuple[str, Callable[[], str]]] = {
     'verbs': ('command_line.md', verbs), 'effects': ('catalogue.md', effects),
     'parameters': ('catalogue.md', parameters), 'manoeuvres': ('catalogue.md', manoeuvres),
-    'rooms': ('diagnosis.md', rooms)}
+    'laws': ('linear_graph.md', laws), 'rooms': ('diagnosis.md', rooms)}
 
 
 def filled(page: str, text: str) -> str:

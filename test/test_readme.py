@@ -35,7 +35,7 @@ def doc_tables() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize('page', ['catalogue.md', 'command_line.md'])
+@pytest.mark.parametrize('page', ['catalogue.md', 'command_line.md', 'linear_graph.md'])
 def test_tables_are_those_of_the_code(page: str) -> None:
     text = (ROOT / 'docs' / page).read_text(encoding='utf-8')
     assert doc_tables().filled(page, text) == text, 'run: python scripts/doc_tables.py'

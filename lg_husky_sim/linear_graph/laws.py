@@ -20,34 +20,47 @@ class Law:
     ----------
     expression : str
         The law.
-    arguments, parameters : int
-        How many it takes.
+    arguments, parameters : tuple of str
+        What each of them is, in their order.
     about : str
         What it is, with its source.
 
     """
 
     expression: str
-    arguments: int
-    parameters: int
+    arguments: tuple[str, ...]
+    parameters: tuple[str, ...]
     about: str
 
 
+_SPEED = ('sliding speed',)
 LAWS: Mapping[str, Law] = {
-    'proportional': Law('p1*z1', 1, 1, 'linear modulation by a gain p1'),
-    'coulomb': Law('p1*tanh(z1/p2)', 1, 2,
-                   'Coulomb friction of level p1, smoothed over the speed p2'),
-    'viscous_coulomb': Law('p1*z1 + p2*tanh(z1/p3)', 1, 3,
-                           'viscous p1 plus Coulomb p2 smoothed over p3'),
-    'stribeck': Law('(p1 + (p2 - p1)*exp(-(z1/p3)**2))*tanh(z1/p4)', 1, 4,
-                    'Coulomb p1, breakaway p2, Stribeck speed p3, smoothing p4'),
-    'quadratic': Law('p1*z1*abs(z1)', 1, 1, 'turbulent drag or orifice loss p1 z|z|'),
-    'orifice': Law('p1*z1/sqrt(abs(z1) + p2)', 1, 2,
-                   'orifice flow p1 sqrt(P), regularised below the pressure p2'),
-    'diode': Law('p1*(exp(z1/p2) - 1)', 1, 2, 'Shockley diode, saturation p1, voltage p2'),
-    'cubic': Law('p1*z1 + p2*z1**3', 1, 2, 'hardening p1 z + p2 z^3'),
-    'saturation': Law('p1*tanh(z1/p1)', 1, 1, 'unit slope, saturating at p1'),
-    'product': Law('p1*z1*z2', 2, 1, 'modulation of z1 by z2 with a gain p1'),
+    'proportional': Law('p1*z1', ('any variable',), ('gain',),
+                        'a source that follows a variable (an amplifier)'),
+    'coulomb': Law('p1*tanh(z1/p2)', _SPEED,
+                   ('dry friction', 'speed over which it is smoothed'), 'Coulomb friction'),
+    'viscous_coulomb': Law(
+        'p1*z1 + p2*tanh(z1/p3)', _SPEED,
+        ('damping', 'dry friction', 'speed over which it is smoothed'),
+        'viscous and Coulomb friction'),
+    'stribeck': Law(
+        '(p1 + (p2 - p1)*exp(-(z1/p3)**2))*tanh(z1/p4)', _SPEED,
+        ('dry friction', 'breakaway friction', 'Stribeck speed',
+         'speed over which it is smoothed'), 'friction that is larger at the beginning'),
+    'quadratic': Law('p1*z1*abs(z1)', ('speed or flow',), ('drag over the square of z1',),
+                     'turbulent drag, or pressure lost by a turbulent flow'),
+    'orifice': Law(
+        'p1*z1/sqrt(abs(z1) + p2)', ('pressure drop',),
+        ('flow over the square root of pressure', 'pressure below which it is smoothed'),
+        'flow through an orifice'),
+    'diode': Law('p1*(exp(z1/p2) - 1)', ('voltage',),
+                 ('saturation current', 'thermal voltage times ideality'), 'Shockley diode'),
+    'cubic': Law('p1*z1 + p2*z1**3', ('any variable',),
+                 ('slope at zero', 'factor of the cube'), 'what becomes stiffer'),
+    'saturation': Law('p1*tanh(z1/p1)', ('any variable',), ('largest value',),
+                      'unit slope with a limit'),
+    'product': Law('p1*z1*z2', ('any variable', 'any variable'), ('gain',),
+                   'a variable that another one modulates'),
 }
 
 
@@ -70,9 +83,15 @@ def expression_of(law: str, arguments: int, parameters: tuple[str, ...]) -> str:
             raise GraphError(f'law {law!r} is neither one of {", ".join(LAWS)} nor an expression: '
                              f'{error}') from error
         return substituted(law, {'z': 'z1'})
-    if (known.arguments, known.parameters) != (arguments, len(parameters)):
+    if (len(known.arguments), len(known.parameters)) != (arguments, len(parameters)):
         raise GraphError(
-            f'law {law!r} takes {known.arguments} argument(s) and {known.parameters} '
-            f'parameter(s), not {arguments} and {len(parameters)}')
+            f'law {law!r} takes {len(known.arguments)} argument(s) in of '
+            f'({listed("z", known.arguments)}) and {len(known.parameters)} parameter(s) '
+            f'({listed("p", known.parameters)}), not {arguments} and {len(parameters)}')
     return substituted(known.expression, {
         f'p{index + 1}': name for index, name in enumerate(parameters)})
+
+
+def listed(letter: str, meanings: tuple[str, ...]) -> str:
+    """Return what arguments (z) or parameters (p) of a law are, in their order."""
+    return ', '.join(f'{letter}{at}: {meaning}' for at, meaning in enumerate(meanings, 1))

@@ -162,7 +162,7 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         r"characteristic of 'F': no branch 'c' in the graph; there are V, R, C, F"),
     'law with too few parameters': (
         lambda: Characteristic('coulomb', ('V(C)',), ('p',)),
-        r"law 'coulomb' takes 1 argument\(s\) and 2 parameter\(s\), not 1 and 1"),
+        r"law 'coulomb' takes 1 argument\(s\) .* and 2 parameter\(s\) \(p1: dry .*, not 1 and 1"),
     'unknown name in a law': (
         lambda: Characteristic('p*z + q', ('V(C)',), ('p',)),
         r"law 'p\*z \+ q' uses q, which is neither one of its arguments z1 nor"),

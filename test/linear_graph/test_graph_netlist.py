@@ -95,7 +95,8 @@ def test_forms_and_grounds() -> None:
     ('0.5 ohm', '.inf', r"element 'R': value is not finite, or beyond 1e308"),
     ('  J:', '  R:', r'not YAML: R is given twice in line \d+'),
     ('rotational', 'rotary', r"port 2: domain 'rotary' must be one of electrical, trans"),
-    ('law: quadratic', 'law: cubic', r"law 'cubic' takes 1 argument\(s\) and 2 parameter"),
+    ('law: quadratic', 'law: cubic', r"law 'cubic' takes 1 argument\(s\) in of \(z1: any "
+     r'variable\) and 2 parameter\(s\) \(p1: slope at zero, p2: factor of the cube\), not 1 '),
     (', law: quadratic', '', r"element 'drag': of needs a law"),
     ('law: quadratic', 'value: x, law: quadratic', r"element 'drag': give a value or a law"),
     ('{is: voltage source, from: supply}', '7', r"element 'V_s' must be entries of the form"),

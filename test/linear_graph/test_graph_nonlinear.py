@@ -210,3 +210,13 @@ def test_named_laws_give_their_formulas(name: str, parameters: tuple[float, ...]
                      {**dict(zip(names, parameters, strict=True)), 'z1': z})
     assert found == pytest.approx(value, rel=1e-12)
     assert LAWS[name].about
+
+
+@pytest.mark.parametrize('name', LAWS)
+def test_each_argument_and_parameter_of_a_law_has_a_meaning(name: str) -> None:
+    from lg_husky_sim.linear_graph.expressions import names_in
+    law = LAWS[name]
+    assert set(names_in(law.expression)) == {
+        *(f'z{at + 1}' for at in range(len(law.arguments))),
+        *(f'p{at + 1}' for at in range(len(law.parameters)))}
+    assert all((*law.arguments, *law.parameters))
