@@ -55,3 +55,20 @@ def test_the_table_of_elements_names_each_and_its_unit() -> None:
         if kind not in SOURCES:
             unit = unit_needed(Branch('x', kind, domain, 'a', 'b', 'x'))
             assert f' {name} [{unit}] ' in page
+
+
+def test_what_integrates_a_variable_puts_no_load_on_it() -> None:
+    import lg_husky_sim as lg
+    circuit = {'V': {'is': 'voltage source', 'from': 'a'},
+               'R': {'is': 'resistor', 'from': 'a', 'to': 'b', 'value': '2 ohm'},
+               'C': {'is': 'capacitor', 'from': 'b', 'value': '0.5 F'}}
+    counted = lg.graph({'elements': {
+        **circuit,
+        'follow': {'is': 'current source', 'from': 'ground', 'to': 'n', 'law': 'z',
+                   'of': ['i(R)']},
+        'charge': {'is': 'capacitor', 'from': 'n', 'value': '1 F'}}})
+    times = [0.0, 0.5, 1.0, 1.5, 2.0]
+    # The charge on C: C V(C), with and without the integrator.
+    alone = lg.graph({'elements': circuit}).step(times, 'V(C)').values[:, 0]
+    assert counted.step(times, 'V(C)').values[:, 0] == pytest.approx(alone, rel=1e-9)
+    assert counted.step(times, 'V(charge)').values[:, 0] == pytest.approx(0.5 * alone, rel=1e-6)
