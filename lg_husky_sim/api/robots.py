@@ -178,6 +178,8 @@ class Husky(Graph):
         -------
         Recording
             What the model's sensors read: command, wheels, wheel_angles, wheel_torques, imu, pose.
+            A wheel rate is the mean over the 20 ms before its stamp, as an encoder counts it (in
+            the first 20 ms the state itself); all else is the state at the stamp.
 
         Raises
         ------

@@ -48,6 +48,9 @@ def command(
     BAG gets the Husky's topics: /joint_states, /imu_um7/data, /tf and
     /husky_velocity_controller/cmd_vel. A recording with gaps is driven segment by segment, each
     from the state that the robot was in.
+
+    A wheel rate is the mean over the 20 ms before its stamp, as an encoder counts it; all else is
+    the state at the stamp.
     """
     from lg_husky_sim.api.driving import fastest_side
     from lg_husky_sim.api.robots import Husky

@@ -113,3 +113,19 @@ def test_a_late_set_begins_at_its_time_and_no_step_later(robot: Maker) -> None:
     np.testing.assert_allclose(out[:, :13], same.values[:, :13], rtol=0, atol=1e-6)
     assert np.all(out[:25, 3] == pytest.approx(0.0, abs=1e-9))
     assert abs(out[25, 3]) > 1e-3
+
+
+def test_wheel_rates_are_means_over_the_time_that_the_docs_say() -> None:
+    from pathlib import Path
+
+    import lg_husky_sim as lg
+    from lg_husky_sim.husky.plant import ENCODER_WINDOW
+    seen = lg.Husky().simulate('straight', rate=200.0)
+    rates, angles = seen.wheels.values[:, 0], seen.wheel_angles.values[:, 0]
+    back = round(200.0 * ENCODER_WINDOW)
+    np.testing.assert_allclose(
+        rates[back:], (angles[back:] - angles[:-back]) / ENCODER_WINDOW, atol=1e-9)
+    page = Path(__file__).resolve().parents[2] / 'docs' / 'simulate_and_compare.md'
+    words = f'{1e3 * ENCODER_WINDOW:g} ms before its stamp'
+    assert words in page.read_text(encoding='utf-8')
+    assert words in (lg.Husky.simulate.__doc__ or '')
