@@ -280,3 +280,19 @@ def test_what_a_drive_can_determine_is_said_of_the_robot_that_is_given(drive: st
     said = run('info', drive, '--robot', str(tmp_path / 'robot.yaml'), '--json')
     assert '0.7' in said.stdout
     assert said.stdout != run('info', drive, '--json').stdout
+
+
+def test_the_page_names_the_verbs_that_set_and_choose() -> None:
+    text = (Path(__file__).resolve().parent.parent / 'docs' / 'command_line.md').read_text('utf-8')
+    said = re.search(
+        r'`--set` is an option of (.*?), `--topic` of these and (.*?);', text, re.DOTALL)
+    assert said is not None
+    setting, more = (set(re.findall(r'`([\w-]+)`', part)) for part in said.groups())
+    context = click.Context(main.cli)
+    forms: dict[str, set[str | None]] = {}
+    for name in main.cli.list_commands(context):
+        command = main.cli.get_command(context, name)
+        assert command is not None
+        forms[name] = {one.metavar for one in command.params}
+    assert {name for name, form in forms.items() if 'NAME=VALUE […]' in form} == setting
+    assert {name for name, form in forms.items() if 'ROLE=NAME […]' in form} == setting | more
