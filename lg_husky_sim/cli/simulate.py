@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,9 @@ from lg_husky_sim.cli.common import (
 from lg_husky_sim.cli.several import SeveralWords
 
 if TYPE_CHECKING:
+    from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.recording import TopicMap
+    from lg_husky_sim.signals import TimeSeries
 
 
 @click.command(cls=SeveralWords,
@@ -72,3 +75,23 @@ def command(
     if wanted > most:
         say.remark(f'commands ask {wanted:.2f} m/s of a side, and the model has its whole supply '
                    f'at {most:.2f} m/s (1/command_gain): it stays behind them')
+    for remark in _missed(husky, driven.command):
+        say.remark(remark)
+
+
+def _missed(husky: Husky, commands: TimeSeries) -> Iterator[str]:
+    """Say where the steady speed of the model is not the commanded one."""
+    from lg_husky_sim.husky.by_hand import setting
+    from lg_husky_sim.husky.steady_speed import steady_shares
+    values, limit = husky.parameters, setting('missed_speed')
+    forward, yaw = steady_shares(values)
+    if commands.column('forward').any() and abs(forward - 1.0) > limit:
+        yield (f'by its parameters the model drives straight at {forward:.2f} times the commanded '
+               'speed; command_gain = torque_constant gear_ratio / (supply_voltage wheel_radius) '
+               f'= {values["command_gain"] / forward:.4g} s/m would drive it as commanded')
+    # Effects change how a robot turns; in straight driving they are losses beside this.
+    if not husky.effects and commands.column('yaw').any() and min(
+            abs(yaw - 1.0), abs(yaw / forward - 1.0)) > limit:
+        yield (f'by its parameters the model turns at {yaw:.2f} times the commanded yaw rate; '
+               f'with yaw_damping = {values["yaw_damping"]:.4g} N·m·s/rad, turn_ratio = '
+               f'{values["turn_ratio"] * forward / yaw:.4g} m fits')

@@ -23,7 +23,7 @@ SMALL: dict[str, Any] = {
     'mass': 6.0, 'yaw_inertia': 0.08, 'wheel_radius': 0.05, 'track': 0.24, 'wheelbase': 0.18,
     'wheel_inertia': 8e-4, 'motor_resistance': 1.8, 'motor_inductance': 1e-3,
     'torque_constant': 0.02, 'gear_ratio': 30.0, 'supply_voltage': 12.0,
-    'wheel_damping': 0.02, 'yaw_damping': 0.15, 'command_gain': 1.0, 'turn_ratio': 0.22}
+    'wheel_damping': 0.02, 'yaw_damping': 0.32, 'command_gain': 1.0, 'turn_ratio': 0.22}
 LARGE: dict[str, Any] = {
     'mass': 280.0, 'yaw_inertia': 45.0, 'wheel_radius': 0.3, 'track': 1.1, 'wheelbase': 0.9,
     'wheel_inertia': 3.5, 'motor_resistance': 0.12, 'motor_inductance': 2e-4,
@@ -157,7 +157,7 @@ def test_sizes_of_effects_are_listed_for_a_robot(tmp_path: Path) -> None:
     assert lg.list_effects('payload', lg.Husky()).rows == usual.rows
 
 
-@pytest.mark.parametrize('name', ['reach', 'other_robot'])
+@pytest.mark.parametrize('name', ['reach', 'other_robot', 'missed_speed'])
 def test_numbers_of_parameters_have_unit_meaning_and_source(name: str) -> None:
     entry = read_yaml(config_path('parameters.yaml'), SettingsError)['given'][name]
     assert setting(name) == entry['value']
