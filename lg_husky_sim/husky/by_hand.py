@@ -18,6 +18,7 @@ import math
 from lg_husky_sim.errors import ParameterError
 from lg_husky_sim.husky.parameters import number_of, Parameter, Parameters
 from lg_husky_sim.husky.robot_size import HUSKY, RobotSize, size_of
+from lg_husky_sim.husky.together import check_together
 from lg_husky_sim.settings import numbers
 from lg_husky_sim.yaml_files import shown
 
@@ -186,9 +187,13 @@ def with_numbers(parameters: Parameters, own: Collection[str],
             bounds_of(parameters.entry(name), values[name], HUSKY, Number(
                 lower=values[name], upper=values[name]))
     robot = size_of(values, parameters) if not given.keys().isdisjoint(SIZES) else HUSKY
-    return Parameters(tuple(
+    found = Parameters(tuple(
         _given(entry, values[entry.name], robot if entry.name in own else None,
                given.get(entry.name)) for entry in parameters.entries))
+    check_together(values, {entry.name: entry.unit for entry in parameters.entries}, given,
+                   [name for name, one in given.items()
+                    if one.lower is not None or one.upper is not None])
+    return found
 
 
 def _given(entry: Parameter, value: float, robot: RobotSize | None, number: Number | None

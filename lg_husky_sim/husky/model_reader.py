@@ -34,6 +34,7 @@ from lg_husky_sim.husky.model_schema import (
 )
 from lg_husky_sim.husky.parameters import Parameter, Parameters
 from lg_husky_sim.husky.robot_size import HUSKY, RobotSize, size_of
+from lg_husky_sim.husky.together import check_together
 from lg_husky_sim.yaml_files import shown, wrong_schema
 
 MOST_ERRORS = 20
@@ -206,7 +207,14 @@ def _parameters(errors: list[str], data: object, nominal: Parameters | None
     found = [_parameter(errors, name, entry, templates[name], robot)
              for name, entry in given.items() if name in templates]
     found += [nominal.entry(name) for name in IMPLIED if name in nominal and name not in given]
-    return [one for one in found if one is not None], robot
+    read = {one.name: one for one in found if one is not None}
+    if read.keys() >= set(nominal):
+        _tried(errors, lambda: check_together(
+            {name: one.value for name, one in read.items()},
+            {name: one.unit for name, one in read.items()}, given,
+            [name for name, entry in given.items()
+             if isinstance(entry, dict) and not entry.keys().isdisjoint(('lower', 'upper'))]))
+    return list(read.values()), robot
 
 
 def _of_effects() -> set[str]:

@@ -10,7 +10,7 @@ from typing import Any, cast
 from click.testing import CliRunner
 import lg_husky_sim as lg
 from lg_husky_sim.cli.main import cli
-from lg_husky_sim.errors import ParameterError, SettingsError
+from lg_husky_sim.errors import ModelFileError, ParameterError, SettingsError
 from lg_husky_sim.husky.by_hand import setting
 from lg_husky_sim.husky.model_file import load_model, nominal_of
 from lg_husky_sim.resources import config_path
@@ -115,7 +115,7 @@ def test_bounds_stay_in_proportion_and_those_of_the_same_robot_as_they_are() -> 
 
 
 @pytest.mark.parametrize(('name', 'value'), [
-    ('wheel_damping', 120.0), ('command_gain', 0.03), ('mass', 0.5)])
+    ('wheel_damping', 120.0), ('command_gain', 0.03), ('supply_voltage', 0.5)])
 def test_a_value_a_little_beyond_moves_its_bound(name: str, value: float) -> None:
     entry = lg.Husky(None, **{name: value}).parameters.entry(name)
     nominal = load_model().parameters.entry(name)
@@ -157,13 +157,63 @@ def test_sizes_of_effects_are_listed_for_a_robot(tmp_path: Path) -> None:
     assert lg.list_effects('payload', lg.Husky()).rows == usual.rows
 
 
-@pytest.mark.parametrize('name', ['reach', 'other_robot', 'missed_speed'])
-def test_numbers_of_parameters_have_unit_meaning_and_source(name: str) -> None:
-    entry = read_yaml(config_path('parameters.yaml'), SettingsError)['given'][name]
+@pytest.mark.parametrize(('section', 'name', 'unit'), [
+    ('given', 'reach', '1'), ('given', 'other_robot', '1'), ('given', 'missed_speed', '1'),
+    ('together', 'radius_most', '1'), ('together', 'inertia_least', '1'),
+    ('together', 'inertia_most', '1'), ('together', 'density_least', 'kg/m³'),
+    ('together', 'density_most', 'kg/m³')])
+def test_numbers_of_parameters_have_unit_meaning_and_source(
+        section: str, name: str, unit: str) -> None:
+    entry = read_yaml(config_path('parameters.yaml'), SettingsError)[section][name]
     assert setting(name) == entry['value']
-    assert entry['unit'] == '1'
+    assert entry['unit'] == unit
     assert len(entry['meaning']) > 20
     assert entry['source']
+
+
+#: A Jackal as its numbers should be: within all bounds of single parameters in other units, too.
+JACKAL: dict[str, Any] = {'mass': 17.0, 'yaw_inertia': 0.43, 'wheel_radius': 0.098,
+                          'track': 0.376, 'wheelbase': 0.262}
+SLIPS: dict[str, tuple[dict[str, Any], str]] = {
+    'radius in cm': ({'wheel_radius': 9.8}, 'wheel_radius = 9.8 m and track = 0.5708 m are no '
+                     'robot together: wheel_radius / track = 17.2 is above 1; write them in SI'),
+    'track in cm': ({'track': 37.6}, '(track² + wheelbase²)) = 4.47e-05 is below 0.002'),
+    'mass in g': ({'mass': 17000.0}, '(track² + wheelbase²)) = 0.000306 is below 0.002'),
+    'inertia': ({'mass': 17.0, 'yaw_inertia': 430.0},
+                '(track² + wheelbase²)) = 43 is above 2.5'),
+    'lengths in cm': ({**JACKAL, 'wheel_radius': 9.8, 'track': 37.6, 'wheelbase': 26.2,
+                       'yaw_inertia': 4300.0, 'wheel_inertia': 100.0, 'wheel_damping': 9.0,
+                       'yaw_damping': 1000.0},
+                      'mass / (track wheelbase wheel_radius) = 0.00176 kg/m³ is below 1 kg/m³')}
+
+
+@pytest.mark.parametrize('name', SLIPS)
+def test_sizes_that_no_robot_has_together_are_refused(name: str) -> None:
+    numbers, words = SLIPS[name]
+    with pytest.raises(ParameterError) as caught:
+        lg.Husky(**numbers)
+    assert words in str(caught.value)
+    assert '\n' not in str(caught.value)
+
+
+def test_sizes_that_are_meant_have_a_bound_of_their_own_and_are_read_again(tmp_path: Path) -> None:
+    assert lg.Husky(**JACKAL).parameters['track'] == 0.376
+    odd = lg.Husky(mass=17.0, yaw_inertia=lg.Number(430.0, upper=900.0))
+    odd.save(tmp_path / 'odd.yaml')
+    assert lg.Husky(tmp_path / 'odd.yaml').replacing(wheel_damping=2.0).parameters[
+        'yaw_inertia'] == 430.0
+
+
+def test_a_file_by_hand_in_centimetres_is_refused(tmp_path: Path) -> None:
+    values = {**lg.Husky().parameters, **SMALL}
+    lines = [f'  {name}: {value}' for name, value in values.items()]
+    text = '\n'.join(['schema: lg_husky_sim/model/1', 'parameters:', *lines, ''])
+    (tmp_path / 'small.yaml').write_text(text, encoding='utf-8')
+    assert lg.Husky(tmp_path / 'small.yaml').parameters['track'] == 0.24
+    (tmp_path / 'small.yaml').write_text(
+        text.replace('wheelbase: 0.18', 'wheelbase: 18.0'), encoding='utf-8')
+    with pytest.raises(ModelFileError, match=r'wheelbase = 18 m are no robot together'):
+        lg.Husky(tmp_path / 'small.yaml')
 
 
 def test_a_twin_is_compared_with_a_model_of_its_own_robot() -> None:
