@@ -12,7 +12,7 @@ from typing import Any, TYPE_CHECKING
 from lg_husky_sim.api.curves import FrequencyResponse, StepResponse
 from lg_husky_sim.api.transfer_functions import root_text, TransferFunction, warn_of
 from lg_husky_sim.errors import GraphError, ParameterError
-from lg_husky_sim.linear_graph import compile_numeric, LinearGraph, StateSpace
+from lg_husky_sim.linear_graph import Branch, compile_numeric, Kind, LinearGraph, StateSpace
 from lg_husky_sim.linear_graph.state_space import FloatArray
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -292,7 +292,12 @@ class Responses(ABC):
 
     def _first_output(self) -> str:
         if not self.outputs:
-            raise GraphError("the graph has no output; name one, such as output='v(m)'")
+            # Of an A-type where there is one: its across variable is a state, as a rule.
+            edges = self.graph.edges
+            at = next((place for place, edge in enumerate(edges) if isinstance(edge.owner, Branch)
+                       and edge.owner.kind is Kind.A_TYPE), max(len(self.graph.branches) - 1, 0))
+            name = self.graph.variable_name(at, True)
+            raise GraphError(f"the graph has no output; name one, such as output='{name}'")
         return self.outputs[0]
 
     def _space(self, output: str, values: Mapping[str, float]) -> StateSpace:

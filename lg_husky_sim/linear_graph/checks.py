@@ -52,6 +52,35 @@ def check_complete(graph: LinearGraph) -> None:
     _check_open_ends(graph)
 
 
+def check_number(element: Branch | TwoPort, number: float, shown: str) -> None:
+    """
+    Check the number of a passive element, as far as it holds whatever the graph is.
+
+    Parameters
+    ----------
+    element : Branch or TwoPort
+        Storage, dissipator or two-port.
+    number : float
+        Its value.
+    shown : str
+        The value as it is written.
+
+    Raises
+    ------
+    GraphError
+        If a storage is not positive, a dissipator negative, or the value of a two-port zero.
+
+    """
+    if isinstance(element, TwoPort):
+        allowed, right = 'not zero', number != 0.0
+    elif element.kind is Kind.D_TYPE:
+        allowed, right = 'zero or positive', number >= 0.0
+    else:
+        allowed, right = 'positive', number > 0.0
+    if not right:
+        raise GraphError(f'value = {shown} is not allowed; it must be {allowed}')
+
+
 def check_symbols(graph: LinearGraph) -> None:
     """
     Check that elements, parameters and inputs can stand in one equation: a name means one thing.

@@ -32,7 +32,7 @@ import re
 from typing import Any
 
 from lg_husky_sim.errors import GraphError, ModelFileError
-from lg_husky_sim.linear_graph.checks import check_complete, check_symbols
+from lg_husky_sim.linear_graph.checks import check_complete, check_number, check_symbols
 from lg_husky_sim.linear_graph.elements import (
     Branch,
     Characteristic,
@@ -280,7 +280,9 @@ def _value(entry: Mapping[str, Any], draft: Branch | TwoPort, values: dict[str, 
     if draft.name in values:
         raise ModelFileError(f'{draft.name!r} is a parameter too; write value: {draft.name}, or '
                              'give the number in one place')
-    values[draft.name], unit = _quantity(given, 'value')
+    number, unit = _quantity(given, 'value')
+    check_number(draft, number, str(given))
+    values[draft.name] = number
     units[draft.name] = unit or unit_needed(draft)
     return draft.name
 
@@ -299,6 +301,9 @@ def _quantity(given: Any, what: str) -> tuple[float, str]:
         raise ModelFileError(f'{what} = {given!r} must be a number with a unit, '
                              "such as '0.5 ohm'")
     number, unit = float(match.group(1)), match.group(2)
+    if re.match(r',\d', unit):
+        raise ModelFileError(f'{what} = {given!r} has a comma in its number; a decimal is written '
+                             'with a point')
     try:
         scaled = number * parse_unit(unit).scale
     except GraphError as error:
@@ -370,6 +375,9 @@ def _mapping(given: Any, what: str, known: Collection[str] | None) -> Mapping[st
 
 def _known(given: Mapping[str, Any], what: str, known: Collection[str]) -> None:
     for key in given:
+        if key not in known and given[key] is None and key[:1].isdigit():
+            raise ModelFileError(f'{what}: {key!r} stands after a comma, which ends an entry; a '
+                                 'decimal is written with a point')
         if key not in known:
             raise ModelFileError(f'{what}: unknown key {key!r}{suggestion(key, sorted(known))}')
 

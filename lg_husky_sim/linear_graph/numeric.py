@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from lg_husky_sim.errors import GraphError, ParameterError
+from lg_husky_sim.linear_graph.elements import Branch, TwoPort
 from lg_husky_sim.linear_graph.expressions import compile_tuple, evaluate, GLOBALS, names_in
 from lg_husky_sim.linear_graph.graph import close_name, LinearGraph
 from lg_husky_sim.linear_graph.loops import effort_order
@@ -313,7 +314,8 @@ class NumericModel:
     def _explained(self, values: Mapping[str, float]) -> ParameterError:
         """Return the error that names the first value that is not allowed."""
         for value in self.structure.values:
-            shown = f'{value.owner!r} = {value.text}'
+            same = value.text == value.owner
+            shown = f'{value.owner!r}' if same else f'{value.owner!r} = {value.text}'
             for name in names_in(value.text):
                 if name not in values:
                     hint = '' if name in self.graph.names else close_name(name, values)
@@ -327,9 +329,16 @@ class NumericModel:
                      'not zero': abs(number) >= SMALLEST, 'any': True}
             if not (np.isfinite(number) and rules[value.rule]):
                 allowed = 'finite' if value.rule == 'any' else f'finite and {value.rule}'
-                return ParameterError(f'element {shown} = {number:g} is not allowed; '
+                unit = self._unit(value.owner) if value.rule != 'any' else ''
+                return ParameterError(f'element {shown} = {number:g}{unit} is not allowed; '
                                       f'it must be {allowed}')
         return ParameterError('the values of the elements are not single numbers')
+
+    def _unit(self, name: str) -> str:
+        from lg_husky_sim.linear_graph.units import unit_needed
+        elements: tuple[Branch | TwoPort, ...] = (*self.graph.branches, *self.graph.two_ports)
+        unit = unit_needed(next(one for one in elements if one.name == name))
+        return '' if unit == '1' else f' {unit}'
 
 
 __all__ = ['NumericModel', 'compile_numeric']

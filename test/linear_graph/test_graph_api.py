@@ -169,7 +169,7 @@ def test_a_transfer_function_asks_for_names_and_one_form() -> None:
         graph.transfer_function(one, one)
     with pytest.raises(ParameterError, match='by_parameter is for symbols'):
         graph.transfer_function('V(C_2)', numbers=True, by_parameter=True)
-    with pytest.raises(GraphError, match="no output; name one, such as output='v"):
+    with pytest.raises(GraphError, match=r"name one, such as output='V\(C_1\)'"):
         lg.graph(DIVIDER.partition('outputs')[0]).transfer_function()
 
 

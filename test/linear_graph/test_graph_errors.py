@@ -201,13 +201,13 @@ def test_there_are_ten_and_more_and_the_right_graph_passes() -> None:
 
 
 @pytest.mark.parametrize(('values', 'message'), [
-    ({'R': 1.0}, r"parameter 'C' of element 'C' = C has no value"),
-    ({'R': 1.0, 'C': 0.0}, r"element 'C' = C = 0 is not allowed; it must be finite and positive"),
-    ({'R': 1.0, 'C': 1e-320}, r"element 'C' = C = 9.99989e-321 is not allowed"),
-    ({'R': -2.0, 'C': 1.0}, r"element 'R' = R = -2 is not allowed"),
-    ({'R': float('nan'), 'C': 1.0}, r"element 'R' = R = nan is not allowed"),
-    ({'R': 1.0, 'C': float('inf')}, r"element 'C' = C = inf is not allowed"),
-    ({'R': 1.0, 'C': 'x'}, r"element 'C' = C cannot be evaluated"),
+    ({'R': 1.0}, r"parameter 'C' of element 'C' has no value"),
+    ({'R': 1.0, 'C': 0.0}, r"element 'C' = 0 F is not allowed; it must be finite and positive"),
+    ({'R': 1.0, 'C': 1e-320}, r"element 'C' = 9.99989e-321 F is not allowed"),
+    ({'R': -2.0, 'C': 1.0}, r"element 'R' = -2 ohm is not allowed"),
+    ({'R': float('nan'), 'C': 1.0}, r"element 'R' = nan ohm is not allowed"),
+    ({'R': 1.0, 'C': float('inf')}, r"element 'C' = inf F is not allowed"),
+    ({'R': 1.0, 'C': 'x'}, r"element 'C' cannot be evaluated"),
 ])
 def test_numbers_that_are_not_allowed(values: dict[str, float], message: str) -> None:
     with pytest.raises(ParameterError, match=message):

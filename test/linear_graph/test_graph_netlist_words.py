@@ -33,6 +33,25 @@ NETS: dict[str, tuple[str, str]] = {
     'source without from, another ground': (
         'ground: wall\nelements: {F: {is: force source, to: m}, m: {is: mass, from: m}}',
         'write from: wall for a source'),
+    'decimal comma': (
+        "elements: {R: {is: resistor, from: a, value: '1,5 ohm'}}",
+        r"^netlist: element 'R': value = '1,5 ohm' has a comma in its number; a decimal is "
+        'written with a point$'),
+    'decimal comma without quotes': (
+        'elements: {R: {is: resistor, from: a, value: 1,5 ohm}}',
+        "element 'R': '5 ohm' stands after a comma, which ends an entry; a decimal is written"),
+    'decimal comma of a parameter': (
+        "parameters: {d: '1,5'}\nelements: {r: {is: resistor, from: a, value: d}}",
+        "parameter d = '1,5' has a comma in its number"),
+    'negative resistance': (
+        'elements: {R: {is: resistor, from: a, value: -3 ohm}}',
+        "^netlist: element 'R': value = -3 ohm is not allowed; it must be zero or positive$"),
+    'no mass': ('elements: {m: {is: mass, from: a, value: 0 kg}}',
+                "^netlist: element 'm': value = 0 kg is not allowed; it must be positive$"),
+    'ratio of nothing': (
+        'elements: {t: {is: transformer, value: 0, port 1: {domain: electrical, from: a}, '
+        'port 2: {domain: rotational, from: b}}}',
+        "^netlist: element 't': value = 0 is not allowed; it must be not zero$"),
     'ground called gnd': (
         'elements: {V: {is: voltage source, from: a, to: gnd}, '
         'R: {is: resistor, from: a, to: gnd}}',

@@ -91,7 +91,7 @@ def test_a_misspelt_parameter_is_named_where_numbers_are_asked_for(
 def test_a_graph_in_symbols_alone_is_not_said_to_lack_numbers() -> None:
     text = 'elements:\n  R: {is: resistor, from: a}\n  C: {is: capacitor, from: a}'
     assert 'No numbers' not in lg.graph(text).text()
-    assert "No numbers: parameter 'R' of element 'R' = R has no value" in lg.graph(
+    assert "No numbers: parameter 'R' of element 'R' has no value" in lg.graph(
         text.replace('capacitor, from: a', 'capacitor, from: a, value: 1')).text()
 
 

@@ -124,7 +124,7 @@ def test_what_cannot_be_answered_is_said() -> None:
         lg.graph(LEAD).step('soon')
     with pytest.raises(ParameterError, match='one or more angular frequencies'):
         lg.graph(LEAD).bode([-1.0])
-    with pytest.raises(GraphError, match="no output; name one, such as output='v"):
+    with pytest.raises(GraphError, match=r"name one, such as output='V\(C\)'"):
         lg.graph(LEAD.replace('outputs: [V(R_2)]', '')).step()
     with pytest.raises(ParameterError, match='there is a pole at 0 rad/s'):
         lg.graph(MASS).bode([1.0, 0.0])
