@@ -19,7 +19,6 @@ from collections.abc import Mapping, Sequence
 import math
 from typing import Any
 
-from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.proof.scoring import judge
 from lg_husky_sim.proof.settings import settings
@@ -52,13 +51,11 @@ def _answer(line: Json) -> str:
 def _row(verdict: str, features: Json) -> list[float]:
     """Return what multiplies the coefficients of an answer."""
     if verdict in ('nothing_missing', 'unchanged', 'changed'):
-        return [1.0, math.log10(max(float(features['chance']),
-                                    setting('least_chance')))]
-    share = math.log(min(max(float(features['share']), setting('least_told_share')),
-                         setting('most_told_share')))
+        return [1.0, math.log10(max(float(features['chance']), 1e-12))]
+    share = math.log(min(max(float(features['share']), 1e-3), 10.0))
     if verdict == 'unknown':
         return [1.0, share]
-    return [1.0, share, math.log10(max(float(features['gain']), setting('least_told_gain')))]
+    return [1.0, share, math.log10(max(float(features['gain']), 1.0))]
 
 
 def _weakest(line: Json) -> Json:
@@ -78,9 +75,8 @@ def _names(line: Json) -> list[tuple[list[float], bool]]:
     if true and not any(one['effect'] in true for one in said):
         return []
     count = line['features'].get('readings', settings()['calibration']['readings']['value'])
-    least = setting('least_told_gain')
-    return [([1.0, math.log10(2.0 * max(float(one['gain']), least) / count)],
-             one['effect'] in true) for one in said]
+    return [([1.0, math.log10(2.0 * max(float(one['gain']), 1.0) / count)], one['effect'] in true)
+            for one in said]
 
 
 def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
