@@ -64,3 +64,9 @@ def test_a_robot_at_rest_has_no_dead_encoders(clean: Recording) -> None:
     at_rest = replace(still, streams={**still.streams, 'pose': replace(
         pose, values=0.0 * pose.values)})
     assert standing(segments(at_rest)) == ((), 0.0)
+
+
+def test_a_recording_without_wheels_does_not_hide_dead_ones(clean: Recording) -> None:
+    dead = turning(clean, (0.0, 0.0))
+    none = replace(dead, streams={k: v for k, v in dead.streams.items() if k != 'wheels'})
+    assert standing((*segments(none), *segments(dead)))[0] == ('left', 'right')

@@ -37,11 +37,11 @@ def standing(parts: Sequence[Segment]) -> tuple[tuple[str, ...], float]:
     seconds, still = 0.0, {'left': True, 'right': True}
     most = setting('least_wheel_motion') * setting('relation_window')
     for part in parts:
-        sides = {'left': turned_left(part), 'right': turned_right(part)}
-        if heading(part) is None:
+        left, right = turned_left(part), turned_right(part)
+        if heading(part) is None or left is None or right is None:
             continue
-        for side, way in sides.items():
-            still[side] &= way is not None and float(np.ptp(way[1])) < most
+        for side, (_, angle) in (('left', left), ('right', right)):
+            still[side] &= float(np.ptp(angle)) < most
         seconds += _moved(part)
     enough = seconds >= setting('least_moved')
     return tuple(side for side, stands in still.items() if stands and enough), seconds
