@@ -5,8 +5,8 @@ Arrays that go back to the system when they are freed.
 
 The GNU C library takes large blocks from the system one by one, but only until the first of them
 is freed: from then on blocks of its size come from the heap, where one small block behind them
-keeps them. A diagnosis, which makes and frees arrays of a megabyte by the thousand, took a sixth
-more memory so. A threshold that is set stays.
+keeps them. A diagnosis makes and frees arrays of a megabyte by the thousand. A threshold that is
+set stays.
 """
 
 from __future__ import annotations

@@ -121,19 +121,15 @@ def test_verbs_that_are_not_installed_are_not_listed(monkeypatch: pytest.MonkeyP
     assert 'absent' not in CliRunner().invoke(main.cli, ['-h']).output
 
 
-def test_help_loads_nothing_slow_or_optional() -> None:
-    ask = ('import sys\nfrom lg_husky_sim.cli.main import run\nrun(["-h"])\n'
-           'slow = {"sympy", "scipy", "matplotlib", "rosbags", "numba", "mujoco", "cyclonedds"}\n'
-           'sys.exit(", ".join(sorted(slow & set(sys.modules))) or None)')
-    done = subprocess.run([sys.executable, '-c', ask], text=True, capture_output=True,
-                          timeout=60, check=False)
-    assert (done.returncode, done.stderr) == (0, '')
-
-
-def test_what_few_diagnoses_need_is_not_loaded_for_all() -> None:
-    ask = ('import sys\nimport lg_husky_sim.diagnosis.diagnose\n'
-           'slow = {"scipy.stats", "scipy.signal", "sympy", "matplotlib"}\n'
-           'sys.exit(", ".join(sorted(slow & set(sys.modules))) or None)')
+@pytest.mark.parametrize(('what', 'slow'), [
+    ('from lg_husky_sim.cli.main import run\nrun(["-h"])',
+     {'sympy', 'scipy', 'matplotlib', 'rosbags', 'numba', 'mujoco', 'cyclonedds'}),
+    ('import lg_husky_sim.diagnosis.diagnose',
+     {'scipy.stats', 'scipy.signal', 'sympy', 'matplotlib'})])
+def test_nothing_slow_or_optional_is_loaded_before_it_is_needed(what: str, slow: set[str]
+                                                                ) -> None:
+    ask = (f'import sys\n{what}\n'
+           f'sys.exit(", ".join(sorted({slow} & set(sys.modules))) or None)')
     done = subprocess.run([sys.executable, '-c', ask], text=True, capture_output=True,
                           timeout=60, check=False)
     assert (done.returncode, done.stderr) == (0, '')

@@ -100,8 +100,8 @@ class Graph:
     """
     Looks at discovery; made when somebody asks for the first time.
 
-    A look takes as long as there are news, and not as there are endpoints: to read 130 of them
-    takes some 20 ms, in which a node's messages wait.
+    A look takes as long as there are news, and not as there are endpoints: a node's messages wait
+    meanwhile.
 
     Parameters
     ----------
