@@ -11,6 +11,7 @@ from lg_husky_sim.diagnosis.decision.adoption import is_rather_real, likely_real
 from lg_husky_sim.diagnosis.diagnose import diagnose
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import Effect, effect_kind, Subsystem
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
 from lg_husky_sim.manoeuvres import Manoeuvre, Step
@@ -20,13 +21,18 @@ from lg_husky_sim.signals import TimeSeries
 import numpy as np
 import pytest
 
-NOISE = {'wheels': 0.0156, 'imu': 0.0039, 'pose': 0.0026}
+NOISE = {'wheels': 0.0218, 'imu': 0.0055, 'pose': 0.0036}
 
 
-def rolling(robot: Callable[..., Plant], force: float) -> Recording:
-    """Return a drive of half a minute with a rolling resistance [N]."""
+def effect(name: str) -> Effect:
+    """Return an effect of the catalogue on its first side."""
+    return Effect(name, effect_kind(name).sides[0])
+
+
+def uneven(robot: Callable[..., Plant], change: float) -> Recording:
+    """Return a drive of half a minute with left wheels that are larger by a share."""
     random = np.random.default_rng(0)
-    plant = robot('rolling_resistance', rolling_force=force)
+    plant = robot(Effect('wheel_radius_mismatch', 'left'), radius_change=change)
     steps = [Step(float(random.uniform(0.4, 2.0)), float(random.uniform(-0.8, 0.8)),
                   float(random.uniform(-0.8, 0.8)), 0.2) for _ in range(16)]
     still = Step(1.0, 0.0, 0.0, 0.2)
@@ -40,11 +46,20 @@ def rolling(robot: Callable[..., Plant], force: float) -> Recording:
 
 def test_the_share_of_the_variance_counts() -> None:
     """What a model is off by gains the more the longer a recording is, as effects do."""
-    assert likely_real(50.0, 10000) == pytest.approx(likely_real(500.0, 100000))
-    assert likely_real(50.0, 10000) < likely_real(60.0, 10000)
-    assert not is_rather_real(40.0, 31000)
-    assert is_rather_real(400.0, 31000)
-    assert 0.0 < likely_real(0.0, 31000) < 0.01
+    slope = effect('slope')
+    assert likely_real(50.0, 10000, slope) == pytest.approx(likely_real(500.0, 100000, slope))
+    assert likely_real(50.0, 10000, slope) < likely_real(60.0, 10000, slope)
+    assert not is_rather_real(30.0, 31000, slope)
+    assert is_rather_real(400.0, 31000, slope)
+    assert 0.0 < likely_real(0.0, 31000, slope) < 0.05
+
+
+def test_of_as_much_a_sensor_s_error_is_likelier_real_than_a_late_command() -> None:
+    """Its form is exact; what a model is off by looks like commands that come late."""
+    told = [likely_real(150.0, 31000, effect(name)) for name in (
+        'gyro_scale', 'slope', 'command_latency')]
+    assert told == sorted(told, reverse=True)
+    assert told[0] > 0.5 > told[2]
 
 
 def test_what_is_fitted_to_names_is_what_decides() -> None:
@@ -52,27 +67,28 @@ def test_what_is_fitted_to_names_is_what_decides() -> None:
     line = {'kind': 'none', 'true': [], 'features': {'readings': 20000},
             'said': [{'effect': 'payload', 'gain': 90.0}]}
     (row, real), = calibration._names(line)
-    odds = np.log(likely_real(90.0, 20000) / (1.0 - likely_real(90.0, 20000)))
+    real_so = likely_real(90.0, 20000, effect('payload'))
+    odds = np.log(real_so / (1.0 - real_so))
     known = calibration.COEFFICIENTS['real']
-    assert known == ('real_constant', 'real_told')
+    assert known[2:] == tuple(sorted(f'real_{part.value}' for part in Subsystem))
     assert not real
     assert odds == pytest.approx(float(np.dot(row, [setting(name) for name in known])))
 
 
-@pytest.mark.parametrize(('force', 'named'), [(0.6, False), (3.0, True)])
+@pytest.mark.parametrize(('change', 'named'), [(0.004, False), (0.02, True)])
 def test_an_effect_that_is_too_little_is_said_but_not_named(
-        robot: Callable[..., Plant], force: float, named: bool) -> None:
+        robot: Callable[..., Plant], change: float, named: bool) -> None:
     """Nor is it unknown: it has a name."""
-    case = diagnose([rolling(robot, force)], load_model(), lambda text, share: None)
+    case = diagnose([uneven(robot, change)], load_model(), lambda text, share: None)
     said, last = case.diagnosis, case.search.rounds[-1]
     assert last.small is not named
     if named:
-        assert [f.effect for f in said.findings] == ['rolling_resistance']
+        assert [f.effect for f in said.findings] == ['wheel_radius_mismatch']
         assert case.search.beside is None
         return
     assert said.verdict is Verdict.NOTHING_MISSING
-    assert 0.5 < last.chance < 1.0
-    assert 'rolling_resistance, gains' in said.remaining
+    assert last.chance < setting('false_alarm_rate')
+    assert 'wheel_radius_mismatch, gains' in said.remaining
     assert '% of the variance of the innovations: beyond chance, but so little' in said.remaining
     assert case.search.beside is not None
     assert case.left.final.point.structure.effects

@@ -10,6 +10,7 @@ from typing import Any
 from lg_husky_sim.cli.main import run
 from lg_husky_sim.diagnosis.decision import confidence
 from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
 from lg_husky_sim.proof import calibration, outcomes
 from lg_husky_sim.proof.calibration import calibrated
@@ -35,7 +36,8 @@ def lines(count: int) -> list[dict[str, Any]]:
     """Return outcomes that are right the oftener the more their name gains."""
     rng = np.random.default_rng(2)
     gains = rng.uniform(1.0, 4.0, count)
-    return [line(f'c{i}', bool(rng.uniform() < g / 4.0), gain=10.0 ** g, share=0.1, chance=1e-9)
+    return [line(f'c{i}', bool(rng.uniform() < g / 4.0), gain=10.0 ** g, share=0.1, chance=1e-9,
+                 readings=100)
             for i, g in enumerate(gains)]
 
 
@@ -54,7 +56,8 @@ def test_a_gain_that_informs_gets_weight_and_the_share_right_is_kept() -> None:
 def test_a_share_that_informs_gets_weight() -> None:
     """Outcomes that are wrong the oftener the more a smooth effort explains."""
     rng = np.random.default_rng(5)
-    rows = [line(f'c{i}', bool(rng.uniform() > s), gain=30.0, share=s, chance=1e-9)
+    rows = [line(f'c{i}', bool(rng.uniform() > s), gain=30.0, share=s, chance=1e-9,
+                 readings=100)
             for i, s in enumerate(rng.uniform(0.02, 1.0, 400))]
     assert calibrated(rows)['name_share'][0] < -0.5
 
@@ -101,8 +104,9 @@ def test_names_beside_a_right_one_and_of_clean_robots_tell_how_large_real_ones_a
         return {**whole, 'kind': 'none', 'level': 'clean', 'true': [],
                 'said': [{**first, 'gain': gain}]}
     rows = [outcome(i, d) for i, d in enumerate(rng.uniform(-4.0, 0.0, 500))]
-    constant, told = (calibrated(rows)[name] for name in ('real_constant', 'real_told'))
-    assert -constant[0] / told[0] == pytest.approx(-2.0, abs=0.2)
+    constant, part, told = (calibrated(rows)[name] for name in (
+        'real_constant', 'real_translation', 'real_told'))
+    assert -(constant[0] + part[0]) / told[0] == pytest.approx(-2.0, abs=0.2)
     assert told[0] > 2.0
     assert constant[1] == 500
     wrong = [line(f'w{i}', False, **features) for i in range(50)]
@@ -110,6 +114,58 @@ def test_names_beside_a_right_one_and_of_clean_robots_tell_how_large_real_ones_a
     extra = line('two', True, **features)
     extra = {**extra, 'said': [*extra['said'], {**extra['said'][0], 'effect': 'payload'}]}
     assert calibrated([*rows, extra])['real_told'][1:] == (502, told[2] + 1)
+
+
+def test_a_part_whose_names_are_oftener_real_gets_weight() -> None:
+    rng = np.random.default_rng(8)
+    features = {'share': 0.1, 'chance': 1e-9, 'gain': 1.0, 'readings': 20000}
+
+    def outcome(i: int) -> dict[str, Any]:
+        effect, often = (('gyro_bias', 0.9), ('command_slew', 0.2))[i % 2]
+        whole = line(f'c{i}', True, **features)
+        said = [{**whole['said'][0], 'effect': effect}]
+        if rng.uniform() < often:
+            return {**whole, 'true': [{**whole['true'][0], 'effect': effect}], 'said': said}
+        return {**whole, 'kind': 'none', 'level': 'clean', 'true': [], 'said': said}
+    found = calibrated([outcome(i) for i in range(400)])
+    told = np.log(9.0) - np.log(0.25)
+    assert found['real_sensor'][0] - found['real_command'][0] == pytest.approx(told, abs=0.5)
+    assert found['real_traction'][0] == pytest.approx(0.0, abs=0.01)
+
+
+def test_names_that_would_not_be_said_today_are_left_out_of_earlier_answers() -> None:
+    """Without any, something is beyond chance and nothing is said: right of a clean robot."""
+    features = {'share': 0.1, 'chance': 1e-9, 'gain': 50.0, 'readings': 40000}
+    missed, clean = line('a', True, **features), {
+        **line('b', True, **features), 'kind': 'none', 'level': 'clean', 'true': []}
+    found = calibrated([missed, *[clean] * 4])
+    assert found['nothing_constant'][1:] == (5, 4)
+    assert found['name_constant'][1] == 0
+    assert found['real_constant'][1:] == (5, 1)
+    small = {**missed['said'][0], 'effect': 'payload'}
+    both = {**missed, 'said': [{**missed['said'][0], 'gain': 900.0}, small]}
+    assert calibrated([both])['name_constant'][1:] == (1, 1)
+    alone = {**missed, 'said': both['said'][:1], 'features': {**features, 'gain': 900.0}}
+    assert calibrated([both])['name_gain'] == calibrated([alone])['name_gain']
+
+
+def test_nothing_is_less_sure_where_a_gain_is_beyond_chance() -> None:
+    rng = np.random.default_rng(3)
+
+    def outcome(i: int, beyond: bool) -> dict[str, Any]:
+        right = bool(rng.uniform() < (0.4 if beyond else 0.9))
+        whole = {**line(f'c{i}', right, gain=9.0, chance=1e-5 if beyond else 0.3, share=0.0),
+                 'verdict': 'nothing_missing', 'said': []}
+        return {**whole, 'kind': 'none', 'level': 'clean', 'true': []} if right else whole
+    found = calibrated([outcome(i, i % 3 == 0) for i in range(600)])
+    odds = found['nothing_constant'][0], found['nothing_beyond'][0]
+    assert 1.0 / (1.0 + np.exp(-odds[0])) == pytest.approx(0.9, abs=0.04)
+    assert 1.0 / (1.0 + np.exp(-sum(odds))) == pytest.approx(0.4, abs=0.08)
+
+
+def test_what_is_called_unlikely_is_what_the_diagnosis_calls_so() -> None:
+    for name in ('false_alarm_rate', *calibration.COEFFICIENTS['real']):
+        assert calibration._number(name) == setting(name)
 
 
 def test_few_outcomes_do_not_make_certainty() -> None:
@@ -122,8 +178,9 @@ def test_few_outcomes_do_not_make_certainty() -> None:
 
 
 @pytest.mark.parametrize(('features', 'named'), [
-    ({'gain': 9.0, 'share': 0.1}, 'case bad'), ({'gain': 9.0, 'share': None, 'chance': 1.0},
-                                                'case bad'), ({}, 'no outcome')])
+    ({'gain': 9.0, 'share': 0.1}, 'case bad'),
+    ({'gain': 9.0, 'share': None, 'chance': 1.0, 'readings': 100}, 'case bad'),
+    ({}, 'no outcome')])
 def test_outcomes_without_what_it_needs_are_refused(features: dict[str, Any], named: str) -> None:
     damaged = {**line('bad', True, **features), 'verdict': 'nothing_missing'}
     if features and 'chance' in features:

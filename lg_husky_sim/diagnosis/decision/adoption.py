@@ -12,9 +12,11 @@ Innovations that are not quite white make a gain larger by chance, by their disp
 No model is exact, and what a robot differs from it by grows with the number of readings as real
 effects do: much of what is beyond chance is too little to be an effect. With the share
 ``v = 2 gain / n`` of the variance of the n innovations that an effect explains, how likely it is
-real is ``p = 1 / (1 + exp(-(c0 + c1 log10 v)))``, by what became of the names of exams. An effect
-is adopted where it is beyond chance and more likely real than not (Bayes' rule where either error
-costs as much).
+real is ``p = 1 / (1 + exp(-(c0 + c1 log10 v + d)))``, by what became of the names of exams, where d
+is of the part of the robot that the effect belongs to: errors of sensors have exact forms, while
+what a log or a model is off by looks like a command that comes late or a wheel of another size.
+An effect is adopted where it is beyond chance and more likely real than not (Bayes' rule where
+either error costs as much).
 
 The log evidence of an effort without a name is the logarithm of a Bayes factor B. Where nothing is
 missing, its mean is one, so that ``P(B >= b) <= 1 / b`` (Markov), and with n of them that are
@@ -28,6 +30,7 @@ import math
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import Hypothesis
 from lg_husky_sim.diagnosis.settings import setting
+from lg_husky_sim.husky.effects import Effect
 from scipy.special import chdtrc, expit
 
 
@@ -68,7 +71,7 @@ def is_beyond_chance(chance: float) -> bool:
     return chance < setting('false_alarm_rate')
 
 
-def likely_real(gain: float, count: int) -> float:
+def likely_real(gain: float, count: int, effect: Effect) -> float:
     """
     Return how likely an effect of the catalogue is real if its gain is beyond chance.
 
@@ -78,6 +81,8 @@ def likely_real(gain: float, count: int) -> float:
         [nats]
     count : int
         Number of readings.
+    effect : Effect
+        Whose part of the robot says how often such a gain is real.
 
     Returns
     -------
@@ -86,12 +91,13 @@ def likely_real(gain: float, count: int) -> float:
 
     """
     told = 2.0 * max(gain, setting('least_told_gain')) / count
-    return float(expit(setting('real_constant') + setting('real_told') * math.log10(told)))
+    return float(expit(setting('real_constant') + setting('real_told') * math.log10(told)
+                       + setting(f'real_{effect.kind.subsystem.value}')))
 
 
-def is_rather_real(gain: float, count: int) -> bool:
+def is_rather_real(gain: float, count: int, effect: Effect) -> bool:
     """Return whether an effect is real more likely than not, see :func:`likely_real`."""
-    return likely_real(gain, count) > 0.5
+    return likely_real(gain, count, effect) > 0.5
 
 
 def evidence_beyond_chance(looks: int) -> float:

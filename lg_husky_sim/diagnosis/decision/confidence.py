@@ -8,8 +8,8 @@ the form of no law is exact, so that they are near 1 for right and wrong names a
 the next name is not used: where it is small, the names are declared not to be told apart. What
 informs of the names is what a smooth effort still explains as a share of what they explain,
 ``x1 = log(share)``, and how much the one that gains least does, ``x2 = log10(gain)``; of
-``unknown``, that share; of ``nothing``, how far the largest gain is beyond chance,
-``x1 = log10(chance)``.
+``unknown``, that share; of ``nothing``, whether the largest gain is beyond chance all the same
+(``x1`` is 1 then, else 0): what is too little to be called real is real often enough.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
+from lg_husky_sim.diagnosis.decision.adoption import is_beyond_chance
 from lg_husky_sim.diagnosis.result import Verdict
 from lg_husky_sim.diagnosis.settings import setting
 
 #: Verdict to the settings that are its coefficients, c0, c1, ...
 COEFFICIENTS = {
     Verdict.KNOWN: ('name_constant', 'name_share', 'name_gain'),
-    Verdict.NOTHING_MISSING: ('nothing_constant', 'nothing_chance'),
+    Verdict.NOTHING_MISSING: ('nothing_constant', 'nothing_beyond'),
     Verdict.UNKNOWN: ('unknown_constant', 'unknown_share_slope'),
 }
 
@@ -63,12 +64,12 @@ def informs(verdict: Verdict, features: Features) -> tuple[float, ...]:
     Returns
     -------
     tuple of float
-        Bounded: what is below the least share, chance, or gain, or above the largest share, is
-        told apart by nobody.
+        Bounded: what is below the least share or gain, or above the largest share, is told apart
+        by nobody.
 
     """
     if verdict is Verdict.NOTHING_MISSING:
-        return (math.log10(max(features.chance, setting('least_chance'))),)
+        return (float(is_beyond_chance(features.chance)),)
     share = math.log(min(max(features.share, setting('least_told_share')),
                          setting('most_told_share')))
     if verdict is Verdict.UNKNOWN:

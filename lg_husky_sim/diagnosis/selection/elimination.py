@@ -60,7 +60,8 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
         left, = others.gains_left(evidence, fit, [final], [loss])
         chance = chance_of(left, one, 1 if len(kept) > 1 else every, evidence, dispersion(
             evidence, final.whitened, final.jacobian[:, own]))
-        if is_beyond_chance(chance) and is_rather_real(loss, evidence.count):
+        if is_beyond_chance(chance) and is_rather_real(
+                loss, evidence.count, one.effect):
             break
         final = fit
         kept = [h for h in kept if h is not one]

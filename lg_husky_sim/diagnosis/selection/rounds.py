@@ -15,11 +15,7 @@ from dataclasses import dataclass, field, replace
 import itertools
 import math
 
-from lg_husky_sim.diagnosis.decision.adoption import (
-    is_beyond_chance,
-    is_rather_real,
-    likely_real,
-)
+from lg_husky_sim.diagnosis.decision.adoption import is_beyond_chance, is_rather_real
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened
@@ -52,8 +48,7 @@ class Round:
         Best score first.
     adopted : bool
     chance : float
-        Probability of such a gain on a robot that lacks nothing; of a small one, that it is not
-        real.
+        Probability of such a gain on a robot that lacks nothing.
     looks : tuple of Look
     small : bool
         Whether the best is beyond chance, but too little to be likely real.
@@ -213,7 +208,9 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
         points = [base.point] + ([nominal] if nominal is not None else [])
         base = min((evidence.fit(with_jitter(p, evidence), base.slopes) for p in points),
                    key=lambda f: f.cost)
-        seen = _looks(evidence, base, pool, [t.hypothesis.effect for t in tried])
+        if _is_real(best):
+            # Anything less leaves the noise, and so what is to be seen, nearly as it was.
+            seen = _looks(evidence, base, pool, [t.hypothesis.effect for t in tried])
         known = [Look(t.hypothesis, numbers_of(t), math.inf)
                  for t in tried[:int(setting('known_best'))]]
         once = {one.hypothesis.label: one for one in reversed(known)}
@@ -228,11 +225,14 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     tried = ranking.ordered([*(_best_form(evidence, base, t) for t in tried[:first]),
                              *tried[first:]])
     tried = _from_the_start(evidence, base, tried)
-    chance, real = ranking.chance(tried[0]), likely_real(tried[0].gain, evidence.count)
+    chance = ranking.chance(tried[0])
     beyond = is_beyond_chance(chance)
-    small = beyond and not is_rather_real(tried[0].gain, evidence.count)
-    return Round(evidence, base, _kept(tried), beyond and not small,
-                 1.0 - real if small else chance, tuple(seen), small)
+    small = beyond and not _is_real(tried[0])
+    return Round(evidence, base, _kept(tried), beyond and not small, chance, tuple(seen), small)
+
+
+def _is_real(tried: Tried) -> bool:
+    return is_rather_real(tried.gain, tried.count, tried.hypothesis.effect)
 
 
 def _kept(tried: Sequence[Tried]) -> tuple[Tried, ...]:
