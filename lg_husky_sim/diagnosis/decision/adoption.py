@@ -12,7 +12,7 @@ Innovations that are not quite white make a gain larger by chance, by their disp
 No model is exact, and what a robot differs from it by grows with the number of readings as real
 effects do: much of what is beyond chance is too little to be an effect. With the share
 ``v = 2 gain / n`` of the variance of the n innovations that an effect explains, how likely it is
-real is ``p = 1 / (1 + exp(-(c0 + c1 log10 v + d)))``, by what became of the names of exams, where d
+real is ``p = 1 / (1 + exp(-(c0 + c1 log10 v + d)))``, by what became of the names of exams. Here d
 is of the part of the robot that the effect belongs to: errors of sensors have exact forms, while
 what a log or a model is off by looks like a command that comes late or a wheel of another size.
 An effect is adopted where it is beyond chance and more likely real than not (Bayes' rule where
