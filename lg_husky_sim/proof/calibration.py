@@ -40,7 +40,7 @@ PARTS = tuple(sorted(set(catalogue.SUBSYSTEM.values())))
 #: Answer to the names of its coefficients in the settings of the diagnosis.
 COEFFICIENTS = {
     'known': ('name_constant', 'name_share', 'name_gain'),
-    'nothing_missing': ('nothing_constant', 'nothing_beyond'),
+    'nothing_missing': ('nothing_constant', 'nothing_beyond', 'nothing_left'),
     'unknown': ('unknown_constant', 'unknown_share_slope'),
     'changed': ('change_constant', 'change_chance'),
     'unchanged': ('unchanged_constant', 'unchanged_chance'),
@@ -63,7 +63,9 @@ def _answer(line: Json) -> str:
 def _row(verdict: str, features: Json) -> list[float]:
     """Return what multiplies the coefficients of an answer."""
     if verdict == 'nothing_missing':
-        return [1.0, float(float(features['chance']) < _number('false_alarm_rate'))]
+        left = float(features['share']) * max(float(features['gain']), 1.0)
+        return [1.0, float(float(features['chance']) < _number('false_alarm_rate')),
+                math.log10(max(left, 1.0))]
     if verdict in ('unchanged', 'changed'):
         return [1.0, math.log10(max(float(features['chance']), 1e-12))]
     share = math.log(min(max(float(features['share']), 1e-3), 10.0))

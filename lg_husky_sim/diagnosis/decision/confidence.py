@@ -9,7 +9,8 @@ the next name is not used: where it is small, the names are declared not to be t
 informs of the names is what a smooth effort still explains as a share of what they explain,
 ``x1 = log(share)``, and how much the one that gains least does, ``x2 = log10(gain)``; of
 ``unknown``, that share; of ``nothing``, whether the largest gain is beyond chance all the same
-(``x1`` is 1 then, else 0): what is too little to be called real is real often enough.
+(``x1`` is 1 then, else 0), since what is too little to be called real is real often enough, and
+what a smooth effort explains, ``x2 = log10(evidence)``.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from lg_husky_sim.diagnosis.settings import setting
 #: Verdict to the settings that are its coefficients, c0, c1, ...
 COEFFICIENTS = {
     Verdict.KNOWN: ('name_constant', 'name_share', 'name_gain'),
-    Verdict.NOTHING_MISSING: ('nothing_constant', 'nothing_beyond'),
+    Verdict.NOTHING_MISSING: ('nothing_constant', 'nothing_beyond', 'nothing_left'),
     Verdict.UNKNOWN: ('unknown_constant', 'unknown_share_slope'),
 }
 
@@ -69,7 +70,9 @@ def informs(verdict: Verdict, features: Features) -> tuple[float, ...]:
 
     """
     if verdict is Verdict.NOTHING_MISSING:
-        return (float(is_beyond_chance(features.chance)),)
+        left = features.share * max(features.gain, setting('least_told_gain'))
+        return (float(is_beyond_chance(features.chance)),
+                math.log10(max(left, setting('least_told_gain'))))
     share = math.log(min(max(features.share, setting('least_told_share')),
                          setting('most_told_share')))
     if verdict is Verdict.UNKNOWN:
