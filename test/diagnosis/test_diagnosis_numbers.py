@@ -11,7 +11,7 @@ from typing import Any
 
 from lg_husky_sim.diagnosis.evidence.noise import NAMES
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.husky.effects import catalogue
+from lg_husky_sim.husky.effects import catalogue, Subsystem
 import pytest
 import yaml
 
@@ -51,8 +51,9 @@ def test_every_number_has_a_value_a_unit_and_a_meaning(name: str) -> None:
 @pytest.mark.parametrize('name', ENTRIES)
 def test_every_number_is_used_somewhere(name: str) -> None:
     prefix, _, rest = name.partition('_')
-    by_noise = re.search(rf"setting\(\s*f'{prefix}_{{", CODE) and rest in NAMES
-    assert re.search(rf"'{name}'", CODE) or by_noise
+    each = {*NAMES, *(part.value for part in Subsystem)}
+    by_each = re.search(rf"setting\(\s*f'{prefix}_{{", CODE) and rest in each
+    assert re.search(rf"'{name}'", CODE) or by_each
 
 
 def test_no_two_numbers_have_one_name() -> None:
