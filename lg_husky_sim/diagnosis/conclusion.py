@@ -206,17 +206,18 @@ def answer(search: Search, rest: Sequence[Effort], free: Sequence[Missing]) -> A
     """
     needed = needed_evidence(rest, free)
     rest, free = felt(rest, free, search.final.point.structure.robot)
-    is_left = max([0.0, *(e.evidence for e in rest), *(m.bursts for m in free)]) > needed
+    left = max([0.0, *(e.evidence for e in rest), *(m.bursts for m in free)])
+    is_left = left > needed
     explained = max([0.0, *(e.explained for e in rest), *(m.bursts for m in free)])
     first = search.rounds[0]
     tried = first.tried
     if not search.adopted:
         gain = max(tried[0].gain, 0.0) if tried else 0.0
-        features = Features(gain, explained / max(gain, 1.0), first.chance)
+        features = Features(gain, explained / max(gain, 1.0), first.chance, left, needed)
         return _sure(Verdict.UNKNOWN if is_left else Verdict.NOTHING_MISSING, features)
     told = max(explained_by(search), tried[0].gain)
     features = Features(min(one.tried[0].gain for one in search.adopted), explained / told,
-                        first.chance)
+                        first.chance, left, needed)
     is_unknown = is_left and features.share > setting('unknown_share') and not (
         _is_its_form(search, rest))
     return _sure(Verdict.UNKNOWN if is_unknown else Verdict.KNOWN, features)

@@ -43,12 +43,18 @@ class Features:
         Evidence of a smooth effort beside the names over what these gain.
     chance : float
         Probability of such a gain on a robot that lacks nothing.
+    left : float
+        Largest log evidence of an effort without a name that is not negligible [nats], 0 if none.
+    needed : float
+        What of it is beyond chance [nats].
 
     """
 
     gain: float
     share: float
     chance: float
+    left: float = 0.0
+    needed: float = 0.0
 
 
 def informs(verdict: Verdict, features: Features) -> tuple[float, ...]:
