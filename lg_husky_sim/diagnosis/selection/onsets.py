@@ -31,15 +31,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def onsets_of(evidence: Evidence) -> list[Onset]:
+def onsets_of(evidence: Evidence, finer: float = 1.0) -> list[Onset]:
     """
-    Return where an effect may begin, on a coarse grid of times and places.
+    Return where an effect may begin, on a grid of times and places.
 
     A recording is driven on after each of its segments but the last, and all but the first one
     follow others: there is no edge there.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Its drives say when and where the robot was.
+    finer : float
+        How often the spacing of this grid goes into that of the coarse one.
+
+    Returns
+    -------
+    list of Onset
+
     """
     found = []
-    spacing, edge = setting('onset_spacing'), setting('onset_edge')
+    spacing, edge = setting('onset_spacing') / finer, setting('onset_edge')
     whole: dict[str, tuple[float, float]] = {}
     for drive in evidence.drives:
         first, last = whole.get(drive.recording, (np.inf, -np.inf))
@@ -54,7 +66,8 @@ def onsets_of(evidence: Evidence) -> list[Onset]:
     x = np.concatenate([d.measured[d.slice_of(Channel.X)] for d in evidence.drives])
     if x.size:
         low, high = np.quantile(x, [0.0, 1.0])
-        count = int(np.clip((high - low) / setting('place_spacing'), 0, setting('most_places')))
+        count = int(np.clip((high - low) / setting('place_spacing'), 0, setting('most_places'))
+                    * finer)
         for value in np.linspace(low, high, count + 2)[1:-1]:
             share = float(np.mean(x >= value))
             if min(share, 1.0 - share) > setting('least_share'):
@@ -94,11 +107,7 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     if not onsets:
         return []
     known = {one.hypothesis.label: one.numbers for one in seen}
-    projection = Projection(base)
-    motions = evidence.motions(base.point, True)
-    patterns = [_patterns(evidence, d, motion, w.frame.times[w.frame.order], onsets)
-                for d, motion, w in zip(evidence.drives, motions, evidence.whiteners,
-                                        strict=True)]
+    switches = _Switches.of(evidence, base, onsets)
 
     def best_of(hypothesis: Hypothesis) -> Look | None:
         groups = hypothesis.trials()
@@ -106,19 +115,42 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
             groups = [[{**groups[0][0], **known[hypothesis.label]}]]
         best: Look | None = None
         for group in groups:
-            changes = _changes(evidence, base, motions, hypothesis, group)
-            if changes is None:
-                continue
-            limits = limits_of(hypothesis, group)
-            problems = problems_of(_products(projection, evidence, changes, patterns))
-            for onset, normal, slope in zip(onsets, *problems, strict=True):
-                gain, coefficients = gain_of(normal, slope, limits)
+            for onset, (gain, coefficients) in zip(onsets, switches.gains(hypothesis, group),
+                                                   strict=False):
                 if gain > (0.0 if best is None else best.gain):
                     at = hypothesis.at(onset)
                     best = Look(at, begin(at, group, coefficients), gain)
         return best
     open_ones = [h for h in pool if not h.effect.always_on and h.effect.shape != 'grip']
     return [one for one in evidence.pool.map(best_of, open_ones) if one is not None]
+
+
+@dataclass(frozen=True, eq=False)
+class _Switches:
+    """What effects gain that begin at some onsets, by one simulation of each."""
+
+    evidence: Evidence
+    base: Fit
+    projection: Projection
+    motions: Sequence[Motion]
+    patterns: Sequence[_Patterns]
+
+    @classmethod
+    def of(cls, evidence: Evidence, base: Fit, onsets: Sequence[Onset]) -> _Switches:
+        motions = evidence.motions(base.point, True)
+        return cls(evidence, base, Projection(base), motions, [
+            _patterns(evidence, d, motion, w.frame.times[w.frame.order], onsets)
+            for d, motion, w in zip(evidence.drives, motions, evidence.whiteners, strict=True)])
+
+    def gains(self, hypothesis: Hypothesis, group: Sequence[Numbers]
+              ) -> list[tuple[float, FloatArray]]:
+        """Return the gain at each onset and the coefficients; nothing if it runs away."""
+        changes = _changes(self.evidence, self.base, self.motions, hypothesis, group)
+        if changes is None:
+            return []
+        limits = limits_of(hypothesis, group)
+        problems = problems_of(_products(self.projection, self.evidence, changes, self.patterns))
+        return [gain_of(normal, slope, limits) for normal, slope in zip(*problems, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +265,9 @@ def refined(evidence: Evidence, base: Fit, tried: Any, attempt: Callable[..., An
     """
     Move an onset to where the cost is least.
 
+    The cost may have several minima, and the one at the true onset is narrow: it is looked for on
+    a grid as fine as onsets are told apart, too.
+
     Parameters
     ----------
     evidence : Evidence
@@ -249,7 +284,45 @@ def refined(evidence: Evidence, base: Fit, tried: Any, attempt: Callable[..., An
     Tried
 
     """
-    onset = tried.hypothesis.onset
+    def fitted(near: Any, onset: Onset) -> Any:
+        own = near.fit.point.places[:base.point.places.size]
+        return attempt(evidence, base, near.hypothesis.at(onset), [
+            (base.point, numbers(near)), (base.point.at(own), numbers(near))])
+
+    def moved(near: Any) -> Any:
+        onset = _least(evidence, base, near, numbers(near))
+        again = None if onset == near.hypothesis.onset else fitted(near, onset)
+        return again if again is not None and again.gain > near.gain else near
+    found = [tried, *(fitted(tried, onset) for onset in _others(
+        evidence, base, tried.hypothesis, numbers(tried)))]
+    return max((moved(one) for one in found if one is not None), key=lambda one: one.gain)
+
+
+def _others(evidence: Evidence, base: Fit, hypothesis: Hypothesis, numbers: Numbers
+            ) -> list[Onset]:
+    # Onsets of a fine grid that promise more than the present one, best first.
+    now, apart = hypothesis.onset, setting('onset_spacing')
+    assert now is not None
+    grid = [now, *(one for one in onsets_of(evidence, apart / setting('onset_resolution'))
+                   if one.kind is now.kind)]
+    promised = [gain for gain, _ in _Switches.of(evidence, base, grid).gains(
+        hypothesis.at(None), [numbers])]
+    found: list[Onset] = []
+    near = setting('onset_resolution') if now.kind is OnsetKind.TIME else (
+        setting('place_spacing') * setting('onset_resolution') / apart)
+    for gain, one in sorted(zip(promised, grid, strict=False), key=lambda two: -two[0]):
+        if gain <= promised[0] + setting('least_look') or (
+                len(found) == int(setting('onset_starts'))):
+            break
+        if all(one.recording != other.recording or abs(one.value - other.value) > 2.0 * near
+               for other in (now, *found)):
+            found.append(one)
+    return found
+
+
+def _least(evidence: Evidence, base: Fit, tried: Any, numbers: Numbers) -> Onset:
+    # Where the cost of a fit is least as its onset alone moves, in steps that get shorter.
+    onset: Onset = tried.hypothesis.onset
     is_time = onset.kind is OnsetKind.TIME
     step = 0.5 * (setting('onset_spacing') if is_time else setting('place_spacing'))
     least = setting('onset_time_step') if is_time else setting('onset_place_step')
@@ -261,7 +334,7 @@ def refined(evidence: Evidence, base: Fit, tried: Any, attempt: Callable[..., An
         if is_time and limits and not limits[0][0] <= at <= limits[-1][1]:
             return np.inf
         moved = tried.hypothesis.at(Onset(onset.kind, at, onset.recording))
-        there = moved.point(base.point, numbers(tried)).at(point.places)
+        there = moved.point(base.point, numbers).at(point.places)
         return evidence.cost(evidence.residuals(evidence.predict(there)), there)
     while step > least:
         options = [(cost(value + s * step), value + s * step) for s in (-1.0, 1.0)]
@@ -270,9 +343,4 @@ def refined(evidence: Evidence, base: Fit, tried: Any, attempt: Callable[..., An
             best, value = found, place
         else:
             step *= 0.5
-    if value == onset.value:
-        return tried
-    moved = tried.hypothesis.at(Onset(onset.kind, value, onset.recording))
-    again = attempt(evidence, base, moved, [(base.point, numbers(tried)), (
-        base.point.at(point.places[:base.point.places.size]), numbers(tried))])
-    return again if again is not None and again.gain > tried.gain else tried
+    return Onset(onset.kind, value, onset.recording)
