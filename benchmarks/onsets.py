@@ -21,6 +21,7 @@ from typing import Any
 import warnings
 
 import lg_husky_sim as lg
+from lg_husky_sim.diagnosis.evidence.drives import Channel
 from lg_husky_sim.diagnosis.selection.search import Search
 from lg_husky_sim.parallel import map_tasks
 from lg_husky_sim.signals import FloatArray
@@ -53,8 +54,7 @@ def innovations(search: Search) -> Bins:
         edges = np.arange(drive.start, drive.end, BIN)
         place = np.digitize(at, edges) - 1
         inside = (place >= 0) & (place < edges.size)
-        bins = np.zeros((edges.size, 9))
-        counts = np.zeros((edges.size, 9))
+        bins, counts = np.zeros((2, edges.size, len(Channel)))
         np.add.at(bins, (place[inside], channels[inside]), own[inside])
         np.add.at(counts, (place[inside], channels[inside]), 1.0)
         rows.append(bins / np.sqrt(np.maximum(counts, 1.0)))
@@ -128,8 +128,11 @@ def main() -> None:
     parser.add_argument('folder', type=Path, help='of a trial: with cases/ and answers/')
     parser.add_argument('--jobs', type=int, default=2)
     given = parser.parse_args()
-    cases = [case for case in sorted((given.folder / 'cases').iterdir()) if onset_of(json.loads(
-        (given.folder / 'answers' / f'{case.name}.json').read_text()))]
+    answers = sorted((given.folder / 'answers').glob('*.json'))
+    cases = [given.folder / 'cases' / path.stem for path in answers
+             if onset_of(json.loads(path.read_text()))]
+    if not cases:
+        parser.error(f'{given.folder} has no answer of one effect that begins at a time')
     names, table = [*METHODS, 'diagnosis'], []
     for case, (hidden, named, found) in zip(cases, tqdm(
             map_tasks(errors, cases, given.jobs), total=len(cases)), strict=True):

@@ -88,6 +88,7 @@ def test_an_effect_that_is_too_little_is_said_but_not_named(
         return
     assert said.verdict is Verdict.NOTHING_MISSING
     assert last.chance < setting('false_alarm_rate')
+    assert said.features['left'] <= said.features['needed'] > 0.0
     assert 'wheel_radius_mismatch, gains' in said.remaining
     assert '% of the variance of the innovations: beyond chance, but so little' in said.remaining
     assert case.search.beside is not None

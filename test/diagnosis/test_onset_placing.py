@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import evidence_of
 from lg_husky_sim.diagnosis.evidence.noise import first_guess
@@ -20,37 +19,29 @@ from lg_husky_sim.diagnosis.selection.tried import numbers_of
 from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.husky.plant import Plant
-from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.recording import Recording
-from lg_husky_sim.signals import TimeSeries
 from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
-NOISE = {'wheels': 0.0156, 'imu': 0.0039, 'pose': 0.0026}
 
-
-def dragged(robot: Callable[..., Plant], seed: int, begin: float) -> Recording:
+def dragged(robot: Callable[..., Plant], record: Callable[..., Recording], seed: int,
+            begin: float) -> Recording:
     """Return a drive of half a minute, fast and slow, with a drag from some time on."""
     random = np.random.default_rng(seed)
     plant = robot(Effect('quadratic_drag', late=True), drag=25.0,
                   onset=Onset(OnsetKind.TIME, begin, 'rec'))
-    steps = [Step(float(random.uniform(0.8, 3.0)), float(random.choice([0.1, 0.9, -0.9, 0.5])),
-                  float(random.uniform(-0.4, 0.4)), 0.2) for _ in range(16)]
-    still = Step(1.0, 0.0, 0.0, 0.2)
-    seen = simulate_commands(plant, Manoeuvre('random', (still, *steps, still)).commands(), 1.0)
-    noisy = {name: TimeSeries(seen[name].times, seen[name].values + deviation
-                              * random.standard_normal(seen[name].values.shape), seen[name].names)
-             for name, deviation in NOISE.items()}
-    return Recording('rec', 'rec', {'command': seen['command'], **noisy}, 0,
-                     frames=('odom', 'base_link'))
+    steps = [(float(random.uniform(0.8, 3.0)), float(random.choice([0.1, 0.9, -0.9, 0.5])),
+              float(random.uniform(-0.4, 0.4))) for _ in range(16)]
+    return record('rec', plant, [(1.0, 0.0, 0.0), *steps, (1.0, 0.0, 0.0)], seed)
 
 
 @pytest.mark.parametrize(('seed', 'begin'), [(0, 22.0), (4, 23.6)])
 def test_from_any_time_of_the_coarse_grid_the_true_onset_is_found(
-        robot: Callable[..., Plant], seed: int, begin: float) -> None:
+        robot: Callable[..., Plant], record: Callable[..., Recording], seed: int, begin: float
+        ) -> None:
     """It shows in moments only: by steps from there the fit ends up to 18 s beside it."""
-    drives, model = drives_of([dragged(robot, seed, begin)]), load_model()
+    drives, model = drives_of([dragged(robot, record, seed, begin)]), load_model()
     start = beginning(model.structure, base_unknowns(model.parameters, drives),
                       model.parameters, Reading())
     drag, = (one for one in hypotheses(model.structure) if one.effect.id == 'quadratic_drag')
