@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from lg_husky_sim.diagnosis.before_after.base_robot import FIXED
+from lg_husky_sim.diagnosis.before_after.base_names import FIXED
 from lg_husky_sim.diagnosis.before_after.settings import Quantity, Settings
 from lg_husky_sim.husky.parameters import Parameters
 from lg_husky_sim.signals import FloatArray

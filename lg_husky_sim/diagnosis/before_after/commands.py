@@ -42,6 +42,9 @@ def accepted(times: FloatArray, values: FloatArray, late: float, most: float, sl
         k += 1
     for s in range(out.size):
         end = start + (s + 1) * step
+        if place == target and (k == times.size or times[k] + late > end):
+            out[s], now = place, end
+            continue
         total = 0.0
         while now < end:
             until = end

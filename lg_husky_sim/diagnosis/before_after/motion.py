@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import threading
 
 from lg_husky_sim.diagnosis.before_after.base import Base
-from lg_husky_sim.diagnosis.before_after.base_robot import FIXED, OUTPUTS, ROBOT, simulate
+from lg_husky_sim.diagnosis.before_after.base_names import FIXED, OUTPUTS, ROBOT
+from lg_husky_sim.diagnosis.before_after.base_robot import simulate
 from lg_husky_sim.diagnosis.before_after.commands import accepted
 from lg_husky_sim.diagnosis.before_after.drives import Drive
-from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,22 +46,24 @@ def distinct(rows: FloatArray) -> tuple[list[list[float]], NDArray[np.intp]]:
     return [list(row) for row in found], np.array(which, dtype=np.intp)
 
 
-def _accepted(base: Base, drive: Drive, robots: FloatArray, begin: FloatArray) -> FloatArray:
+def _accepted(base: Base, drive: Drive, robots: FloatArray, begin: FloatArray,
+              commands: Sequence[TimeSeries]) -> FloatArray:
     # The command that each robot takes; most take the same.
     found = np.empty((drive.steps, 2, len(robots)))
     wheels = base.fixed[FIXED.index('wheel_radius')] * begin[3:]
     ahead, turning = 0.5 * (wheels[0] + wheels[1]), wheels[1] - wheels[0]
-    values = np.ascontiguousarray(drive.command.values.T)
+    values = [np.ascontiguousarray(one.values.T) for one in commands]
+    sent = np.minimum(np.arange(len(robots)), len(commands) - 1)
     at = base.names.index
     for column, (axis, gain, now) in enumerate((
             ('forward', 'speed_gain', ahead), ('yaw', 'turn_width', turning))):
         how = robots[:, [at('dead_time'), at(f'limit_{axis}'), at(f'slew_{axis}'), at(gain)]]
-        rows, which = distinct(how)
+        rows, which = distinct(np.column_stack([how, sent]))
         taken = np.empty((drive.steps, len(rows)))
         one = np.empty(drive.steps)
-        for k, (late, most, slew, gain_here) in enumerate(rows):
-            accepted(drive.command.times, values[column], late, most, slew, now / gain_here,
-                     drive.start, base.settings.simulation['step'], one)
+        for k, (late, most, slew, gain_here, number) in enumerate(rows):
+            accepted(commands[int(number)].times, values[int(number)][column], late, most, slew,
+                     now / gain_here, drive.start, base.settings.simulation['step'], one)
             taken[:, k] = one
         found[:, column] = taken[:, which]
     return found
@@ -70,8 +74,8 @@ def side_by_side(base: Base) -> int:
     return int(base.settings.simulation['lanes'])
 
 
-def moved(base: Base, drive: Drive, robots: FloatArray, memory: Memory | None = None
-          ) -> FloatArray:
+def moved(base: Base, drive: Drive, robots: FloatArray, memory: Memory | None = None,
+          commands: Sequence[TimeSeries] = ()) -> FloatArray:
     """
     Simulate a drive of some robots side by side.
 
@@ -85,6 +89,8 @@ def moved(base: Base, drive: Drive, robots: FloatArray, memory: Memory | None = 
         Their parameters, in units; one, or as many as go together at most.
     memory : Memory, optional
         Where the motion is kept until this is called again.
+    commands : sequence of TimeSeries
+        What each robot is sent, if not what the drive holds.
 
     Returns
     -------
@@ -108,7 +114,7 @@ def moved(base: Base, drive: Drive, robots: FloatArray, memory: Memory | None = 
                                     for (one,) in late])
             wheels[:, column] = read[:, which]
     else:
-        command = _accepted(base, drive, robots, drive.begin)
+        command = _accepted(base, drive, robots, drive.begin, commands or [drive.command])
     simulate(np.ascontiguousarray(robots[:, :len(ROBOT)].T), base.fixed, step, command,
              drive.level, wheels, base.given, begin, lanes, out)
     return out

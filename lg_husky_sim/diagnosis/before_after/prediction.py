@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from lg_husky_sim.diagnosis.before_after.base import Base
-from lg_husky_sim.diagnosis.before_after.base_robot import OUTPUTS, ROBOT
+from lg_husky_sim.diagnosis.before_after.base_names import OUTPUTS, ROBOT
 from lg_husky_sim.diagnosis.before_after.drives import Bins, Drive
 from lg_husky_sim.diagnosis.before_after.means import mean_in_bins
 from lg_husky_sim.diagnosis.before_after.motion import distinct, Memory, moved, side_by_side
-from lg_husky_sim.signals import FloatArray
+from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 from numpy.typing import NDArray
 
@@ -136,17 +136,19 @@ def measured(base: Base, drive: Drive) -> dict[str, FloatArray]:
 _MEMORY = Memory()
 
 
-def _several(base: Base, drive: Drive, robots: Sequence[FloatArray]
+def _several(base: Base, drive: Drive, robots: Sequence[FloatArray],
+             commands: Sequence[TimeSeries] = ()
              ) -> Iterator[tuple[FloatArray, dict[str, FloatArray]]]:
     # Motion and prediction of as many robots at a time as go together.
     for first in range(0, len(robots), side_by_side(base)):
-        some = np.array(robots[first:first + side_by_side(base)])
-        motion = moved(base, drive, some, _MEMORY)
+        together = slice(first, first + side_by_side(base))
+        some = np.array(robots[together])
+        motion = moved(base, drive, some, _MEMORY, commands[together])
         yield motion, predicted(base, drive, some, motion)
 
 
-def residuals(base: Base, drive: Drive, places: Sequence[FloatArray]
-              ) -> list[dict[str, FloatArray]]:
+def residuals(base: Base, drive: Drive, places: Sequence[FloatArray],
+              commands: Sequence[TimeSeries] = ()) -> list[dict[str, FloatArray]]:
     """
     Return measured less predicted at each of some places.
 
@@ -158,6 +160,8 @@ def residuals(base: Base, drive: Drive, places: Sequence[FloatArray]
         Its bins are what was measured.
     places : sequence of numpy.ndarray, shape (n,)
         On the scale of the estimates.
+    commands : sequence of TimeSeries
+        What the robot is sent at each of them, if not what the drive holds.
 
     Returns
     -------
@@ -167,7 +171,7 @@ def residuals(base: Base, drive: Drive, places: Sequence[FloatArray]
     """
     there = measured(base, drive)
     return [{name: there[name] - rows[..., k] for name, rows in should.items()}
-            for _, should in _several(base, drive, [base.values(z) for z in places])
+            for _, should in _several(base, drive, [base.values(z) for z in places], commands)
             for k in range(next(iter(should.values())).shape[-1])]
 
 

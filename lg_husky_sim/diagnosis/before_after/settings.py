@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from lg_husky_sim.diagnosis.before_after.base_robot import ROBOT
+from lg_husky_sim.diagnosis.before_after.base_names import ROBOT
 from lg_husky_sim.errors import DiagnosisError
 from lg_husky_sim.husky.robot_size import RobotSize
 from lg_husky_sim.resources import config_path

@@ -9,13 +9,13 @@ limit of the current does to a few hard starts would pass for them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.before_after.base import Base
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior
-from lg_husky_sim.diagnosis.before_after.prediction import residual
+from lg_husky_sim.diagnosis.before_after.prediction import residual, residuals
 from lg_husky_sim.diagnosis.before_after.recording_fits import by_recording, RecordingFits
 from lg_husky_sim.diagnosis.before_after.whitening import noise_of, surprise
 from lg_husky_sim.diagnosis.evidence.clock_search import (
@@ -36,7 +36,8 @@ def at_own_ticks(fits: RecordingFits, pool: Threads) -> tuple[Drive, ...] | None
     """
     Return the drives with commands at the likeliest ticks of their base.
 
-    Ticks are accepted where they are likelier than none. The likelihood is that of residuals whose
+    Ticks are accepted where they are likelier than none, by more than chance, as the fits are and
+    with the robots fitted anew. The likelihood is that of residuals whose
     noise is estimated: with s standard deviations of the n residuals of a channel, ticks gain
     ``n log(s without / s with)``, summed over channels.
 
@@ -53,17 +54,17 @@ def at_own_ticks(fits: RecordingFits, pool: Threads) -> tuple[Drive, ...] | None
         None where none are likelier than commands that are applied as they come.
 
     """
+    step = fits.base.settings.simulation['step']
+    chance = gain_by_chance([own[-1].start + step * own[-1].steps - own[0].start
+                             for own in by_recording(fits.drives).values()])
     search = _search(fits, fits.places, pool)
-    rivals = search.likeliest() if any(
+    rivals = search.likeliest(chance) if any(
         one.steps.scatter > setting('clock_shows') for one in search.tickers) else ()
     if not rivals:
         return None
     plain = _fitted(fits, {}, pool)
     best = min((_fitted(fits, clocks, pool) for clocks in rivals), key=lambda one: one.surprise)
-    step = fits.base.settings.simulation['step']
-    lengths = [own[-1].start + step * own[-1].steps - own[0].start
-               for own in by_recording(fits.drives).values()]
-    if plain.surprise - best.surprise <= gain_by_chance(lengths):
+    if plain.surprise - best.surprise <= chance:
         return None
     # Ticks by what is known of the robot with them.
     clocks = _search(fits, best.places, pool).sharp({
@@ -98,20 +99,24 @@ def _later(base: Base, z: FloatArray, by: float) -> FloatArray:
 
 
 def _ticker(base: Base, drive: Drive, z: FloatArray) -> Ticker | None:
-    def read(commands: TimeSeries, later: float) -> Rates:
-        left = residual(base, replace(drive, command=commands), _later(base, z, later))
-        found = []
-        if 'wheels' in left:
-            times = drive.bins['wheels'].centres()
-            found += [(column, times) for column in left['wheels'].T]
-        if 'imu' in left:
-            found.append((left['imu'][:, 0], drive.bins['imu'].centres()))
+    def read(tries: Sequence[tuple[TimeSeries, float]]) -> list[Rates]:
+        every = residuals(base, drive, [_later(base, z, later) for _, later in tries],
+                          [commands for commands, _ in tries])
+        found: list[Rates] = []
+        for left in every:
+            rates = []
+            if 'wheels' in left:
+                times = drive.bins['wheels'].centres()
+                rates += [(column, times) for column in left['wheels'].T]
+            if 'imu' in left:
+                rates.append((left['imu'][:, 0], drive.bins['imu'].centres()))
+            found.append(rates)
         return found
     value = dict(zip(base.names, base.values(z), strict=True))
     settings = base.settings
     steps = steps_of(
         drive.command, (drive.start, drive.start + drive.steps * settings.simulation['step']),
-        lambda held: read(held, 0.0), value['dead_time'],
+        lambda held: read([(held, 0.0)])[0], value['dead_time'],
         value['wheels_window'] + settings.bins['wheels'], settings.fit['tick_spread'])
     return None if steps is None else Ticker(
         drive.recording, drive.command, read, steps, value['dead_time'])

@@ -94,11 +94,12 @@ def ticker_of(plant: Plant, drive: Drive, log: Reading, spread: float) -> Ticker
     # A place is where the pose says.
     rates_only = drive if is_measured(drive, plant.onset) else _without_pose(drive)
 
-    def read(commands: TimeSeries, later: float) -> Rates:
-        return _rates(plant, replace(rates_only, commands=commands, logged=commands),
-                      log.replacing({'command_delay': delay + later}))
-    steps = steps_of(drive.commands, (drive.start, drive.end), lambda held: read(held, 0.0),
-                     delay, log.get('wheel_window'), spread)
+    def read(tries: Sequence[tuple[TimeSeries, float]]) -> list[Rates]:
+        return [_rates(plant, replace(rates_only, commands=commands, logged=commands),
+                       log.replacing({'command_delay': delay + later}))
+                for commands, later in tries]
+    steps = steps_of(drive.commands, (drive.start, drive.end),
+                     lambda held: read([(held, 0.0)])[0], delay, log.get('wheel_window'), spread)
     return None if steps is None else Ticker(drive.recording, drive.commands, read, steps, delay)
 
 

@@ -41,8 +41,8 @@ class Ticker:
     commands : TimeSeries
         As they come.
     read : callable
-        Returns the residuals of the rates, each with its times [s], with some commands that act
-        so much later [s].
+        Returns the residuals of the rates, each with its times [s], with each of some commands
+        that act so much later [s].
     steps : Steps
     delay : float
         From a command to its effect, where all are applied as they come [s].
@@ -51,21 +51,22 @@ class Ticker:
 
     recording: str
     commands: TimeSeries
-    read: Callable[[TimeSeries, float], Rates]
+    read: Callable[[Sequence[tuple[TimeSeries, float]]], Sequence[Rates]]
     steps: Steps
     delay: float
 
     @functools.cached_property
     def plain(self) -> float:
         """Return the cost without a clock."""
-        return self._cost(self.commands, 0.0)
+        return self._costs([(self.commands, 0.0)])[0]
 
-    def cost(self, clock: Clock) -> float:
-        """Return the negative log likelihood of rates with a clock, to a constant."""
-        return self._cost(at_ticks(self.commands, clock.period, clock.phase), clock.late)
+    def gains(self, clocks: Sequence[Clock]) -> FloatArray:
+        """Return what rates gain by each of some clocks, in nats."""
+        return np.array([self.plain - cost for cost in self._costs([
+            (at_ticks(self.commands, one.period, one.phase), one.late) for one in clocks])])
 
-    def _cost(self, commands: TimeSeries, later: float) -> float:
-        return student.cost(scaled(self.read(commands, later), self.steps.scales))
+    def _costs(self, tries: Sequence[tuple[TimeSeries, float]]) -> list[float]:
+        return [student.cost(scaled(rates, self.steps.scales)) for rates in self.read(tries)]
 
 
 def at_ticks(commands: TimeSeries, period: float, phase: float) -> TimeSeries:
@@ -204,9 +205,17 @@ class ClockSearch:
         return float(max(own[-1].steps.stamps[-1] - own[0].steps.stamps[0]
                          for own in self.recordings.values()))
 
-    def gain(self, clocks: Mapping[str, Clock]) -> float:
-        """Return what rates gain by clocks, in nats."""
-        return sum(one.plain - one.cost(clocks[one.recording]) for one in self.tickers)
+    def _gains(self, tried: Mapping[str, Sequence[Clock]]) -> dict[str, FloatArray]:
+        # What the drives of each recording gain by each of its clocks, in nats.
+        most = int(setting('clock_batch'))
+        tasks = [(one, name, first) for name, own in self.recordings.items() for one in own
+                 for first in range(0, len(tried[name]), most)]
+        parts = self.pool.map(
+            lambda task: task[0].gains(tried[task[1]][task[2]:task[2] + most]), tasks)
+        found = {name: np.zeros(len(clocks)) for name, clocks in tried.items()}
+        for (_, name, first), part in zip(tasks, parts, strict=True):
+            found[name][first:first + most] += part
+        return found
 
     def _apart(self, rates: Sequence[float]) -> list[float]:
         # Without those that the longest recording cannot tell from one before.
@@ -216,16 +225,22 @@ class ClockSearch:
                 found.append(rate)
         return found
 
-    def likeliest(self) -> list[dict[str, Clock]]:
-        """Return the likeliest clocks by recordings at each rate that stands out, best first."""
+    def likeliest(self, least: float = 0.0) -> list[dict[str, Clock]]:
+        """
+        Return the likeliest clocks by recordings at each rate that stands out, best first.
+
+        Those by which the rates gain no more than ``least`` nats are left out.
+        """
         in_step = self._in_step()
         rates = self._apart([*in_step, *_promising([one.steps for one in self.tickers])])
-        found = _best([*self.pool.map(self._tried, rates),
-                       *self.pool.map(self._prompt, in_step)], 'clock_rates')
+        rivals = [*self.pool.map(self._linear, rates), *self._prompt(in_step)]
+        gains = sum(self._gains({name: [clocks[name] for clocks in rivals]
+                                 for name in self.recordings}).values())
+        found = _best(zip(np.atleast_1d(gains).tolist(), rivals, strict=True), 'clock_rates')
         for finer in _finer():
             found = _best((self._sharpened(clocks, finer) for _, clocks in found),
                           'clock_rivals')
-        return [clocks for gain, clocks in found if gain > 0.0]
+        return [clocks for gain, clocks in found if gain > least]
 
     def sharp(self, clocks: Mapping[str, Clock]) -> Mapping[str, Clock]:
         """Return the likeliest clocks near some."""
@@ -240,40 +255,41 @@ class ClockSearch:
         fastest, slowest = 1.0 / setting('clock_shortest'), 1.0 / setting('clock_longest')
         return [own * k for k in range(1, int(fastest / own) + 1) if own * k >= slowest]
 
-    def _prompt(self, rate: float) -> tuple[float, dict[str, Clock]]:
-        # The likeliest phase of each recording, by simulation, of ticks that alone make late: even
-        # ones, and those between which commands come, where a little jitter makes some late.
-        found, count, period = {}, int(setting('clock_phases')), 1.0 / rate
+    def _prompt(self, rates: Sequence[float]) -> list[dict[str, Clock]]:
+        # The likeliest phases of each recording, by simulation, of ticks that alone make late:
+        # even ones, and those between which commands come, where a little jitter makes some late.
+        count = int(setting('clock_phases'))
         parts = (np.arange(count) + 0.5) / count
+        tried: dict[str, list[Clock]] = {}
         for name, own in self.recordings.items():
-            late = -own[0].delay
-            came = np.mod(np.concatenate([one.commands.times for one in own]), period)
-            clocks = [Clock(period, float(phase), late)
-                      for phase in (*(period * parts), *np.quantile(came, parts))]
-            found[name] = min(clocks, key=lambda clock, own=own: sum(  # type: ignore[misc]
-                one.cost(clock) for one in own))
-        return self.gain(found), found
+            times = np.concatenate([one.commands.times for one in own])
+            tried[name] = [
+                Clock(1.0 / rate, float(phase), -own[0].delay) for rate in rates
+                for phase in (*(parts / rate), *np.quantile(np.mod(times, 1.0 / rate), parts))]
+        best = {name: np.argmax(gains.reshape(len(rates), 2 * count), axis=1)
+                for name, gains in self._gains(tried).items()}
+        return [{name: clocks[2 * count * k + int(best[name][k])]
+                 for name, clocks in tried.items()} for k in range(len(rates))]
 
-    def _tried(self, rate: float) -> tuple[float, dict[str, Clock]]:
+    def _linear(self, rate: float) -> dict[str, Clock]:
         drift = setting('clock_drift') * np.linspace(-1.0, 1.0, 5) / self.longest
-        clocks = _same_rate(self.recordings, (1.0 + drift / rate) / rate,
-                            int(setting('clock_phases')))
-        return self.gain(clocks), clocks
+        return _same_rate(self.recordings, (1.0 + drift / rate) / rate,
+                          int(setting('clock_phases')))
 
     def _sharpened(self, clocks: Mapping[str, Clock], finer: float
                    ) -> tuple[float, dict[str, Clock]]:
         # The likeliest clocks near some, by simulation, and what rates gain by them.
         drift, part = setting('clock_drift') / finer, setting('clock_shift') / finer
         steps = np.linspace(-1.0, 1.0, int(setting('clock_parts')))
-        tried = {name: [[_moved(clocks[name], own, drift * turn / self.longest, part * later)
-                         for later in steps] for turn in steps]
+        tried = {name: [_moved(clocks[name], own, drift * turn / self.longest, part * later)
+                        for turn in steps for later in steps]
                  for name, own in self.recordings.items()}
-        gains = {name: np.array([list(self.pool.map(
-            lambda clock, own=own: sum(one.plain - one.cost(clock) for one in own), held))
-            for held in tried[name]]) for name, own in self.recordings.items()}
+        gains = {name: own.reshape(steps.size, steps.size)
+                 for name, own in self._gains(tried).items()}
         rate = int(np.argmax(sum(np.max(own, axis=1) for own in gains.values())))
         return float(sum(np.max(own[rate]) for own in gains.values())), {
-            name: tried[name][rate][int(np.argmax(own[rate]))] for name, own in gains.items()}
+            name: tried[name][rate * steps.size + int(np.argmax(own[rate]))]
+            for name, own in gains.items()}
 
 
 def _finer() -> FloatArray:

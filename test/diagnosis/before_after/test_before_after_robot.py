@@ -13,7 +13,8 @@ from typing import Any
 from lg_husky_sim.diagnosis.before_after import diagnose_change, prediction
 from lg_husky_sim.diagnosis.before_after import settings as settings_module
 from lg_husky_sim.diagnosis.before_after.base import Base, base_of
-from lg_husky_sim.diagnosis.before_after.base_robot import OUTPUTS, ROBOT, simulate
+from lg_husky_sim.diagnosis.before_after.base_names import OUTPUTS, ROBOT
+from lg_husky_sim.diagnosis.before_after.base_robot import simulate
 from lg_husky_sim.diagnosis.before_after.commands import accepted
 from lg_husky_sim.diagnosis.before_after.comparison import Block, Candidate
 from lg_husky_sim.diagnosis.before_after.conclusion import findings

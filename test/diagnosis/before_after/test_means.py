@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from lg_husky_sim.diagnosis.before_after.base import base_of
-from lg_husky_sim.diagnosis.before_after.base_robot import OUTPUTS
+from lg_husky_sim.diagnosis.before_after.base_names import OUTPUTS
 from lg_husky_sim.diagnosis.before_after.drives import drives
 from lg_husky_sim.diagnosis.before_after.means import mean_in_bins
 from lg_husky_sim.diagnosis.before_after.prediction import predicted

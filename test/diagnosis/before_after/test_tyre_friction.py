@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from lg_husky_sim.diagnosis.before_after.base import base_of
-from lg_husky_sim.diagnosis.before_after.base_robot import OUTPUTS, ROBOT, simulate
+from lg_husky_sim.diagnosis.before_after.base_names import OUTPUTS, ROBOT
+from lg_husky_sim.diagnosis.before_after.base_robot import simulate
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.signals import FloatArray
