@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+import math
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.diagnose import diagnose
@@ -67,6 +68,11 @@ def pool() -> Iterator[Threads]:
     """Return one thread."""
     with Threads(1) as threads:
         yield threads
+
+
+def _once(commands: TimeSeries) -> TimeSeries:
+    last = np.append(np.diff(commands.times) > 0.0, True)
+    return TimeSeries(commands.times[last], commands.values[last], commands.names)
 
 
 def test_commands_wait_for_the_next_tick_and_the_last_one_counts() -> None:
@@ -154,7 +160,7 @@ def test_the_period_of_a_base_is_found_from_two_drives(
     known = recalibration.Recalibrated(
         evidence, plain[1], recalibration.Logged(plain[1]), *plain)
     for base, accepted in ((ticked[1], True), (distorted, False)):
-        other = replace(known, base=base)
+        other = replace(known, evidence=ticked[0], base=base)
         monkeypatch.setattr(recalibration, 'recalibrated', lambda *_, other=other: other)
         assert (recalibration.at_ticks(known, start, [found]) is other) is accepted
     quiet = evidence_of(drives, ['one', 'two'], start, replace(guess, values={
@@ -223,6 +229,33 @@ def test_ticks_are_tried_again_with_what_was_found(
     assert [one.effect.id for one in found.found] == ['gyro_scale']
     assert found.final.point.values['gyro_factor'] == pytest.approx(1.08, abs=0.01)
     assert found.plain.point.unknowns[-1].name == 'tick_delay one'
+
+
+def test_a_dead_time_from_an_onset_on_is_compared_with_ticks(
+        made: Made, pool: Threads, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands that come in step with slow ticks act at once or a tick later then, too."""
+    whole = made('one', 0.0, 1)
+    asked, begin = whole.streams['command'], 0.5 * whole.streams['command'].times[-1]
+    # What was sent so much earlier acts now.
+    late = replace(whole, streams={**whole.streams, 'command': replace(asked, times=np.where(
+        asked.times < begin, asked.times, np.maximum(asked.times - 0.1, begin)))})
+    late = replace(late, streams={**late.streams, 'command': _once(late.streams['command'])})
+    model = load_model()
+    for recording, gains in ((late, True), (whole, False)):
+        drives = drives_of([recording])
+        start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                          model.parameters, Reading())
+        evidence, base = calibrated(
+            evidence_of(drives, ['one'], start, first_guess(drives), pool), start, 1)
+        found = recalibration.late_from_an_onset(evidence, base)
+        assert (found is not None and found < evidence.surprise(base) - 100.0) is gains
+    fit = evidence.fit(start, rounds=0)
+    known = recalibration.Recalibrated(evidence, fit, recalibration.Logged(fit), evidence, fit)
+    monkeypatch.setattr(recalibration, 'likelier_ticks', lambda *_: drives)
+    monkeypatch.setattr(recalibration, 'recalibrated', lambda *_: known)
+    for surprise, taken in ((None, True), (math.inf, True), (-math.inf, False)):
+        monkeypatch.setattr(recalibration, 'late_from_an_onset', lambda *_, s=surprise: s)
+        assert (recalibration.at_ticks(known, start, [drives]) is known) is taken
 
 
 def test_delays_of_single_steps_are_those_to_the_next_tick(made: Made) -> None:

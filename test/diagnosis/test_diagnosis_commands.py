@@ -138,6 +138,23 @@ def test_a_command_has_its_likeliest_explanation_and_not_the_first(
     assert np.all(np.isin(found.times, times)) == (taken == 'missed')
 
 
+@pytest.mark.parametrize(('every', 'most'), [(1, 13), (10, 3), (240, 0)])
+def test_of_few_changes_of_the_command_few_are_late_by_chance(every: int, most: int) -> None:
+    """What repeats the command before it shows in nothing; a dead time would be repaired away."""
+    times = np.linspace(0.0, 47.8, 240)
+    values = np.repeat(np.random.default_rng(1).uniform(-1.0, 1.0, 240 // every), every)
+    logged = TimeSeries(times, np.column_stack([values, values]), ('forward', 'yaw'))
+    changed = np.flatnonzero(np.diff(values, prepend=values[0]))
+
+    def score(commands: TimeSeries) -> FloatArray:
+        # Every change is far off where the base gets it; none is later.
+        e = np.full(240, 0.0 if np.all(np.isin(commands.times, times)) else 50.0)
+        e[[place for place in changed if times[place] in commands.times]] += 40.0
+        return e
+    found = repaired(logged, score(logged), np.ones(240, dtype=bool), times, score)
+    assert 240 - np.count_nonzero(np.isin(times, found.times)) == most
+
+
 def rounding_of(values: FloatArray) -> FloatArray:
     """Return the variances by which the wheel rates of a drive are rounded."""
     recording = driven('rounded', 7, lambda sent: sent)

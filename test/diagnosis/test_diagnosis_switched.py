@@ -16,7 +16,7 @@ from lg_husky_sim.diagnosis.evidence.reading import Reading
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
 from lg_husky_sim.diagnosis.selection import onsets
-from lg_husky_sim.diagnosis.selection.screening import problems_of, Projection
+from lg_husky_sim.diagnosis.selection.screening import Look, problems_of, Projection
 from lg_husky_sim.husky.effects import Onset, OnsetKind
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -91,5 +91,12 @@ def test_each_onset_has_the_products_that_it_would_have_alone(
             normal, slope = projection.problem(columns)
             np.testing.assert_allclose(normals[k], normal, rtol=1e-9, atol=1e-12)
             np.testing.assert_allclose(slopes[k], slope, rtol=1e-9, atol=1e-9)
+        late = next(h for h in hypotheses(model.structure) if h.effect.id == 'command_latency')
+        # A size that gains something always is taken on; one that gains nothing tells nothing.
+        tiny = {'latency': 1e-4}
+        free, poor, good = (onsets.onset_looks(evidence, base, [late], [
+            Look(late, tiny, gain) for gain in gains]) for gains in ([], [0.1], [30.0]))
+        assert free == poor
+        assert free != good
         monkeypatch.setattr(onsets, 'onsets_of', lambda _: [])
         assert onsets.onset_looks(evidence, base, [hypothesis], []) == []

@@ -12,6 +12,7 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 #: Innovations of a drive when its base is driven by other commands than those of the log.
 Score = Callable[[TimeSeries], FloatArray]
@@ -25,7 +26,8 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
     Where the wheels leave a simulation by far more than noise, a command is taken out, acts later,
     or is put into a gap between those before and after it, if that makes the drive likelier by a
     stated gain: whichever does most, less what its numbers cost, which are half of the logarithm
-    of the number of readings each. Of few commands only: up to a stated share.
+    of the number of readings each. Of few commands only: of those that change anything, which are
+    the ones of which it shows, no more than chance would take of a stated share.
 
     Parameters
     ----------
@@ -47,9 +49,11 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
 
     """
     stamps = logged.times
-    if stamps.size <= 3:
+    changes = int(np.count_nonzero(np.any(np.diff(logged.values, axis=0) != 0.0, axis=1)))
+    if stamps.size <= 3 or not changes:
         return logged
-    most = int(setting('missed_share') * stamps.size) + 1
+    most = math.ceil(special.bdtrik(1.0 - setting('false_alarm_rate'), changes,
+                                    setting('missed_share')))
     best, e, cost = logged, whitened, student.cost(whitened)
     tried: set[int] = set()
     for _ in range(most):

@@ -106,7 +106,9 @@ def onset_looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     onsets = onsets_of(evidence)
     if not onsets:
         return []
-    known = {one.hypothesis.label: one.numbers for one in seen}
+    # What gains nothing where it acts always says nothing of its size elsewhere.
+    known = {one.hypothesis.label: one.numbers for one in seen
+             if one.gain >= setting('least_look')}
     switches = _Switches.of(evidence, base, onsets)
 
     def best_of(hypothesis: Hypothesis) -> Look | None:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from lg_husky_sim.diagnosis.evidence.drives import Drive
@@ -15,6 +15,7 @@ from lg_husky_sim.diagnosis.evidence.stamps import likeliest_stamps
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses, Hypothesis
 from lg_husky_sim.diagnosis.selection.conventions import best_reading, read_like
 from lg_husky_sim.diagnosis.selection.nominal import is_distorted, nominal_of
+from lg_husky_sim.diagnosis.selection.onsets import onset_looks
 from lg_husky_sim.diagnosis.selection.rotors import other_rotors, with_rotors_of
 from lg_husky_sim.diagnosis.selection.rounds import calibrated, fitted
 from lg_husky_sim.diagnosis.selection.screening import Look, look
@@ -135,8 +136,9 @@ def at_ticks(known: Recalibrated, start: Point, rivals: Sequence[Sequence[Drive]
     Returns
     -------
     Recalibrated or None
-        None where ticks are not likelier, or the robot's numbers are distorted with them, too: it
-        lacks something else then, which the ticks may be a part of.
+        None where ticks are not likelier, also than commands that are late from some onset on, or
+        the robot's numbers are distorted with them, too: it lacks something else then, which the
+        ticks may be a part of.
 
     """
     start = with_rotors_of(start, known.base.point)
@@ -148,4 +150,39 @@ def at_ticks(known: Recalibrated, start: Point, rivals: Sequence[Sequence[Drive]
     if drives is None:
         return None
     other = recalibrated(*ticked(known.first, start, drives))
-    return None if is_distorted(other.base) else other
+    if is_distorted(other.base):
+        return None
+    rival = late_from_an_onset(known.evidence, known.base)
+    return None if rival is not None and rival < other.evidence.surprise(other.base) else other
+
+
+def late_from_an_onset(evidence: Evidence, base: Fit) -> float | None:
+    """
+    Return the surprise if commands are late from some onset on, and its numbers' price.
+
+    Some commands act later than others then, which slow ticks can mimic.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        With single commands that seem to have been late.
+    base : Fit
+        With commands that are applied as they come.
+
+    Returns
+    -------
+    float or None
+        [nats]. None where there is no such effect, or it gains nothing.
+
+    """
+    pool = [one for one in hypotheses(base.point.structure) if any(
+        'command_delay' in p.delays.values() for p in one.effect.parameters())]
+    # Those that seemed to be late one by one may be what it is all about.
+    evidence = Evidence([replace(d, commands=d.logged) for d in evidence.drives], evidence.names,
+                        evidence.noise, evidence.whiteners, evidence.pool)
+    base = evidence.fit(base.point)
+    tried = fitted(evidence, base, onset_looks(evidence, base, pool, []), [base.point])
+    if not tried:
+        return None
+    own, fit = calibrated(evidence, tried[0].fit.point)
+    return own.surprise(fit) + tried[0].gain - tried[0].score
