@@ -138,7 +138,7 @@ def test_a_command_has_its_likeliest_explanation_and_not_the_first(
     assert np.all(np.isin(found.times, times)) == (taken == 'missed')
 
 
-@pytest.mark.parametrize(('every', 'most'), [(1, 13), (10, 3), (240, 0)])
+@pytest.mark.parametrize(('every', 'most'), [(1, 8), (10, 3), (240, 0)])
 def test_of_few_changes_of_the_command_few_are_late_by_chance(every: int, most: int) -> None:
     """What repeats the command before it shows in nothing; a dead time would be repaired away."""
     times = np.linspace(0.0, 47.8, 240)

@@ -26,8 +26,8 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
     Where the wheels leave a simulation by far more than noise, a command is taken out, acts later,
     or is put into a gap between those before and after it, if that makes the drive likelier by a
     stated gain: whichever does most, less what its numbers cost, which are half of the logarithm
-    of the number of readings each. Of few commands only: of those that change anything, which are
-    the ones of which it shows, no more than chance would take of a stated share.
+    of the number of readings each. Of few commands only: up to a stated share, and of those that
+    change anything, which are the ones of which it shows, no more than chance takes of that share.
 
     Parameters
     ----------
@@ -52,8 +52,9 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
     changes = int(np.count_nonzero(np.any(np.diff(logged.values, axis=0) != 0.0, axis=1)))
     if stamps.size <= 3 or not changes:
         return logged
-    most = math.ceil(special.bdtrik(1.0 - setting('false_alarm_rate'), changes,
-                                    setting('missed_share')))
+    share = setting('missed_share')
+    most = min(int(share * stamps.size) + 1, math.ceil(
+        special.bdtrik(1.0 - setting('false_alarm_rate'), changes, share)))
     best, e, cost = logged, whitened, student.cost(whitened)
     tried: set[int] = set()
     for _ in range(most):

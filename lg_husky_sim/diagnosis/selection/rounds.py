@@ -200,7 +200,7 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     tried = sorted([*tried, *seeds], key=lambda t: -t.score)
     chance = ranking.rough_chance(tried[0]) if tried else 1.0
     if chance > setting('hopeless'):
-        return Round(evidence, base, _kept(tried), False, chance, tuple(seen))
+        return Round(evidence, base, tuple(tried), False, chance, tuple(seen))
     own = evidence.renoised(tried[0].fit)
     for number in range(int(setting('noise_turns'))):
         best = tried[0]
@@ -228,16 +228,11 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     chance = ranking.chance(tried[0])
     beyond = is_beyond_chance(chance)
     small = beyond and not _is_real(tried[0])
-    return Round(evidence, base, _kept(tried), beyond and not small, chance, tuple(seen), small)
+    return Round(evidence, base, tuple(tried), beyond and not small, chance, tuple(seen), small)
 
 
 def _is_real(tried: Tried) -> bool:
     return is_rather_real(tried.gain, tried.count, tried.hypothesis.effect)
-
-
-def _kept(tried: Sequence[Tried]) -> tuple[Tried, ...]:
-    # Only from the first one a fit goes on: derivatives are as large as all the rest of it.
-    return (*tried[:1], *(replace(one, fit=replace(one.fit, slopes=())) for one in tried[1:]))
 
 
 def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:
@@ -245,7 +240,7 @@ def _best_form(evidence: Evidence, base: Fit, tried: Tried) -> Tried:
     there = base.point.at(tried.fit.point.places[:base.point.places.size])
     found = [attempt(evidence, base, other, [(there, {**other.starts[0], **numbers_of(tried)})])
              for other in tried.hypothesis.others]
-    return max([tried, *(one for one in found if one is not None)], key=lambda t: t.score)
+    return max([tried, *(one.light for one in found if one is not None)], key=lambda t: t.score)
 
 
 def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[Tried]:
@@ -260,7 +255,8 @@ def _from_the_start(evidence: Evidence, base: Fit, tried: list[Tried]) -> list[T
     if again is None or not is_near(evidence, best.fit, again.fit, best.score - again.score,
                                     best.gain):
         return tried
-    return [again, *(t for t in tried[1:] if t.hypothesis.effect != again.hypothesis.effect)]
+    return [again.light,
+            *(t for t in tried[1:] if t.hypothesis.effect != again.hypothesis.effect)]
 
 
 def _looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
@@ -304,7 +300,7 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     further : sequence of Look
         Whose numbers are beginnings, too.
     whole : bool
-        Whether to finish the fits of the best ones.
+        Whether to finish the fits of the best ones; other fits may go on from where they end.
 
     Returns
     -------
@@ -321,8 +317,9 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
         if len(points) > 1:
             # What a look promises from one point says little at another.
             numbers += one.hypothesis.starts
-        return attempt(evidence, base, one.hypothesis, list(itertools.product(points, numbers)),
+        made = attempt(evidence, base, one.hypothesis, list(itertools.product(points, numbers)),
                        whole=False)
+        return made.light if made is not None and whole else made
     results = evidence.pool.map(tried, [one for one in looks if one.gain >= least])
     rough = [one for one in results if one is not None]
     rough.sort(key=lambda t: -t.score)
@@ -338,7 +335,7 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
             own = refined(evidence, base, own, attempt, numbers_of)
         places = own.fit.point.places[:base.point.places.size]
         again = attempt(evidence, base, own.hypothesis, [(base.point.at(places), numbers_of(own))])
-        return again if again is not None and again.gain >= own.gain else own
+        return (again if again is not None and again.gain >= own.gain else own).light
     few = int(setting('fitted_whole'))
     found = [*evidence.pool.map(whole_of, rough[:few]), *rough[few:]]
     found.sort(key=lambda t: -t.score)

@@ -359,5 +359,5 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
     # Its innovations are told apart by the frames of the last evidence.
     plain = evidence.fit(plain.point, plain.slopes) if found else base
     last = rounds[-1]
-    beside = last.tried[0].fit if last.small and not found else None
+    beside = evidence.fit(last.tried[0].fit.point) if last.small and not found else None
     return Search(plain, base, evidence, tuple(rounds), tuple(found), beside)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from lg_husky_sim.diagnosis.decision.adoption import chance_of
@@ -24,8 +24,11 @@ class Tried:
     ----------
     hypothesis : Hypothesis
     fit : Fit
+        None goes on from here: see :attr:`light`.
     gain : float
         What it lowers the cost of the base by, under one noise [nats].
+    count : int
+        Number of readings.
 
     """
 
@@ -38,6 +41,17 @@ class Tried:
     def score(self) -> float:
         """Gain less half the logarithm of the number of readings for each number it costs."""
         return self.gain - 0.5 * self.hypothesis.size * math.log(self.count)
+
+    @property
+    def light(self) -> Tried:
+        """
+        Return the same with what others are compared with of its fit, and no more.
+
+        Derivatives are as large as all the rest; of its own numbers, they tell how its gain is
+        dispersed.
+        """
+        own = self.fit.jacobian[:, -len(self.hypothesis.free):]
+        return replace(self, fit=replace(self.fit, slopes=(), jacobian=own.copy()))
 
 
 def numbers_of(tried: Tried) -> Numbers:
