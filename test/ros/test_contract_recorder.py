@@ -10,7 +10,7 @@ from pathlib import Path
 import time
 
 from click.testing import CliRunner
-from lg_husky_sim.cli.record import command
+from lg_husky_sim.cli.main import cli
 from lg_husky_sim.errors import CommandError
 from lg_husky_sim.recording.clock import SKEW_NS
 from lg_husky_sim.ros import api
@@ -61,7 +61,8 @@ def test_simulated_time_stamps_a_bag_and_ends_it(tmp_path: Path) -> None:
 
 
 def test_a_taken_name_is_told_before_a_robot_is_looked_for(tmp_path: Path) -> None:
-    done = CliRunner().invoke(command, [str(tmp_path), '--wait', '0'])
+    # By way of the group: a verb keeps the help option that it had first.
+    done = CliRunner().invoke(cli, ['record', str(tmp_path), '--wait', '0'])
     assert str(done.exception) == f'{tmp_path} exists already; choose another name or remove it'
 
 

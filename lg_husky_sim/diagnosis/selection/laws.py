@@ -10,22 +10,21 @@ their laws may be off by::
     c (t) sum of a_qk hat_k(q(t)),   a_qk from a normal distribution of deviation s
 
 at each of the quantities q that a law may depend on: speeds and their senses, accelerations,
-currents, time. So the innovations e have the covariance ``I + s^2 M M'`` with these columns M, and
-of what a further effect gains by the change d of the readings that it makes, there is left::
+currents, time; one of the commands, on what the whole robot does, not on what one side does. What
+else they may be off by is a part b of their change at each reading, of any sign. So the
+innovations e have the covariance ``I + s^2 M M' + b^2 diag(c^2)`` with these columns M, and of
+what a further effect gains by the change d of the readings that it makes, there is left::
 
-    (d' V e)^2 / (d' V d)  over  (d' e)^2 / (d' d),   V = (I + s^2 M M')^-1
+    (d' V e)^2 / (d' V d)  over  (d' e)^2 / (d' d),   V = (I + s^2 M M' + b^2 diag(c^2))^-1
 
-where the numbers of the robot are projected out of all of them. Whatever else a law may be off by:
-a part b of the change that it makes, root mean square, gains b^2 of what all of the change gains
-if innovations are normal, which is no further effect. Errors of sensors are exact.
+where the numbers of the robot are projected out of all of them. Errors of sensors are exact.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from lg_husky_sim.diagnosis.evidence import student
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.observation import probe_times
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -39,11 +38,12 @@ from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.signals import FloatArray
 import numpy as np
 
-#: Quantities that a law may depend on otherwise than it says.
-ARGUMENTS = ('forward', 'yaw', 'acceleration', 'time', *(
-    f'{name}_{side}' for name in (
-        'wheel_rate', 'sense_wheel_rate', 'wheel_acceleration', 'driving_current')
-    for side in ('left', 'right')))
+#: Quantities that any law may depend on otherwise than it says,
+WHOLE = ('forward', 'yaw', 'acceleration', 'time')
+#: and those of the sides, that one of the commands does not depend on.
+SIDES = tuple(f'{name}_{side}' for name in (
+    'wheel_rate', 'sense_wheel_rate', 'wheel_acceleration', 'driving_current')
+    for side in ('left', 'right'))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,29 +85,40 @@ class Laws:
             [nats]
 
         """
-        exact = [h for h in self.found if h.effect.kind.subsystem is Subsystem.SENSOR]
-        if len(exact) == len(self.found) or not others:
+        parts = {h.effect.kind.subsystem for h in self.found} - {Subsystem.SENSOR}
+        if not parts or not others:
             return list(gains)
-        point = with_effects(self.plain, base.point, exact)
+        point = with_effects(self.plain, base.point, [
+            h for h in self.found if h.effect.kind.subsystem is Subsystem.SENSOR])
         try:
             without = evidence.residuals(evidence.predict(point))
         except LgHuskyError:
             # It runs away without them: there is nothing that they could be a part of.
             return list(gains)
         made = without - base.whitened
-        columns = setting('law_off') * made[:, None] * _shapes(evidence, base)
-        projection = Projection(base)
-        whole = max(student.cost(without) - student.cost(base.whitened), 0.0)
-        form = setting('form_off') ** 2 * whole
-        return [_part_left(projection, base.whitened - other.whitened, columns) * gain - form
+        columns = setting('law_off') * made[:, None] * _shapes(
+            evidence, base, WHOLE if parts == {Subsystem.COMMAND} else (*WHOLE, *SIDES))
+        trust = 1.0 / np.sqrt(1.0 + (setting('form_off') * made) ** 2)
+        exact, loose = Projection(base), Projection(replace(
+            base, whitened=trust * base.whitened, jacobian=trust[:, None] * base.jacobian))
+        columns *= trust[:, None]
+
+        def left(change: FloatArray) -> float:
+            # The part of its gain.
+            normal, slope = exact.problem(change[:, None])
+            if slope[0] <= 0.0 or normal[0, 0] <= 0.0:
+                return 1.0
+            return min(_gain(loose, trust * change, columns) / (
+                float(slope[0]) ** 2 / float(normal[0, 0])), 1.0)
+        return [left(base.whitened - other.whitened) * gain
                 for other, gain in zip(others, gains, strict=True)]
 
 
-def _shapes(evidence: Evidence, base: Fit) -> FloatArray:
-    # The hat functions of the quantities at the time of each innovation, shape (n, k).
+def _shapes(evidence: Evidence, base: Fit, names: Sequence[str]) -> FloatArray:
+    # The hat functions of some quantities at the time of each innovation, shape (n, k).
     known = quantities(evidence, evidence.motions(base.point, True))
     count, found = int(setting('law_knots')), []
-    for name in ARGUMENTS:
+    for name in names:
         pooled = np.concatenate([one[name] for one in known])
         low, high = float(np.min(pooled)), float(np.max(pooled))
         found.append(np.concatenate([hats(np.interp(
@@ -117,11 +128,9 @@ def _shapes(evidence: Evidence, base: Fit) -> FloatArray:
     return np.hstack(found)
 
 
-def _part_left(projection: Projection, change: FloatArray, columns: FloatArray) -> float:
+def _gain(projection: Projection, change: FloatArray, columns: FloatArray) -> float:
+    # Twice what a change gains beside columns of unit deviation [nats].
     normal, slope = projection.problem(np.column_stack([change, columns]))
-    if slope[0] <= 0.0 or normal[0, 0] <= 0.0:
-        return 1.0
-    inner = normal[1:, 1:] + np.eye(columns.shape[1])
-    taken = np.linalg.solve(inner, normal[1:, 0])
+    taken = np.linalg.solve(normal[1:, 1:] + np.eye(columns.shape[1]), normal[1:, 0])
     own, left = normal[0, 0] - normal[0, 1:] @ taken, max(slope[0] - slope[1:] @ taken, 0.0)
-    return float(min(left ** 2 / own / (slope[0] ** 2 / normal[0, 0]), 1.0))
+    return float(left ** 2 / own)
