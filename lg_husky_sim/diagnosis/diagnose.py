@@ -17,6 +17,7 @@ from lg_husky_sim.diagnosis.conclusion import (
     without_undetermined,
 )
 from lg_husky_sim.diagnosis.decision.confidence import Features
+from lg_husky_sim.diagnosis.decision.strain import strained
 from lg_husky_sim.diagnosis.error_tables import with_nominal
 from lg_husky_sim.diagnosis.evidence.drives import drives_of
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, evidence_of, Fit
@@ -46,7 +47,6 @@ from lg_husky_sim.diagnosis.sensors.repair import (
 )
 from lg_husky_sim.diagnosis.sensors.robot import differences, impossible, misread
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.diagnosis.strain import strained
 from lg_husky_sim.husky.effects import Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.husky.parameters import Parameter, Parameters

@@ -10,8 +10,8 @@ import enum
 import math
 from typing import Any
 
+from lg_husky_sim.diagnosis.decision.strain import implausible_words, Strained
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.diagnosis.strain import implausible_words, Strained
 from lg_husky_sim.husky.effects import Onset, OnsetKind, Subsystem
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.reporting.words import quantity_with_unit

@@ -11,6 +11,7 @@ from typing import Any
 import lg_husky_sim as lg
 from lg_husky_sim.api.diagnosing import DiagnosisResult
 from lg_husky_sim.cli.terminal import marked
+from lg_husky_sim.diagnosis.decision.strain import Strained, strained
 from lg_husky_sim.diagnosis.error_tables import error_tables, with_details
 from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.model_mismatch import model_mismatch
@@ -19,7 +20,6 @@ from lg_husky_sim.diagnosis.report import report_data
 from lg_husky_sim.diagnosis.result import Diagnosis, diagnosis_data, Finding, Verdict
 from lg_husky_sim.diagnosis.sensors.robot import Difference
 from lg_husky_sim.diagnosis.settings import setting
-from lg_husky_sim.diagnosis.strain import Strained, strained
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.reporting.data import ErrorRow
 import numpy as np

@@ -8,8 +8,16 @@ from collections.abc import Callable, Sequence
 
 from lg_husky_sim.comparison.output import simulate_commands
 from lg_husky_sim.diagnosis.decision.adoption import is_rather_real, likely_real
+from lg_husky_sim.diagnosis.decision.strain import relieves
 from lg_husky_sim.diagnosis.diagnose import diagnose
+from lg_husky_sim.diagnosis.evidence.drives import drives_of
+from lg_husky_sim.diagnosis.evidence.evidence import evidence_of, Fit
+from lg_husky_sim.diagnosis.evidence.noise import first_guess
+from lg_husky_sim.diagnosis.evidence.point import beginning
+from lg_husky_sim.diagnosis.evidence.reading import Reading
+from lg_husky_sim.diagnosis.evidence.unknowns import base_unknowns
 from lg_husky_sim.diagnosis.result import Verdict
+from lg_husky_sim.diagnosis.selection import elimination, rounds
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.effects import Effect, effect_kind, Subsystem
 from lg_husky_sim.husky.model_file import load_model
@@ -18,6 +26,7 @@ from lg_husky_sim.manoeuvres import Manoeuvre, Step
 from lg_husky_sim.proof import calibration
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import TimeSeries
+from lg_husky_sim.threads import Threads
 import numpy as np
 import pytest
 
@@ -94,6 +103,35 @@ def test_an_effect_that_is_too_little_is_said_but_not_named(
     assert case.search.beside is not None
     assert case.left.final.point.structure.effects
     assert not case.search.final.point.structure.effects
+
+
+def test_what_brings_a_robot_back_into_its_tolerances_is_a_relief(
+        robot: Callable[..., Plant]) -> None:
+    """A load that recalibrated numbers bear explains little, but they are as none can be."""
+    drives, model = drives_of([uneven(robot, 0.0)]), load_model()
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    mass = [u.name for u in start.unknowns].index('mass')
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['rec'], start, first_guess(drives), pool)
+
+        def heavy(deviations: float) -> Fit:
+            places = np.array(start.places)
+            places[mass] += deviations * start.unknowns[mass].deviation
+            return evidence.fit(start.at(places), rounds=0)
+        fine, heavier, worse = map(heavy, (1.0, 5.0, 7.0))
+    assert relieves(heavier, fine)
+    assert not relieves(worse, heavier)
+    assert not relieves(fine, fine)
+
+
+@pytest.mark.parametrize('relief', [True, False])
+def test_a_relief_is_named_however_little_it_explains(
+        relief: bool, robot: Callable[..., Plant], monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (rounds, elimination):
+        monkeypatch.setattr(module, 'relieves', lambda without, within: relief)
+    said = diagnose([uneven(robot, 0.004)], load_model(), lambda text, share: None).diagnosis
+    assert [f.effect for f in said.findings] == relief * ['wheel_radius_mismatch']
 
 
 def test_an_effect_that_the_robot_s_numbers_took_the_place_of_is_named(

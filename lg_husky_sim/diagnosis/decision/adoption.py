@@ -16,7 +16,8 @@ real is ``p = 1 / (1 + exp(-(c0 + c1 log10 v + d)))``, by what became of the nam
 is of the part of the robot that the effect belongs to: errors of sensors have exact forms, while
 what a log or a model is off by looks like a command that comes late or a wheel of another size.
 An effect is adopted where it is beyond chance and more likely real than not (Bayes' rule where
-either error costs as much).
+either error costs as much), or where a robot that its tolerances do not allow is one that they do
+with it (:func:`~lg_husky_sim.diagnosis.decision.strain.relieves`).
 
 The log evidence of an effort without a name is the logarithm of a Bayes factor B. Where nothing is
 missing, its mean is one, so that ``P(B >= b) <= 1 / b`` (Markov), and with n of them that are

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from lg_husky_sim.diagnosis.decision.adoption import chance_of, is_beyond_chance, is_rather_real
+from lg_husky_sim.diagnosis.decision.strain import relieves
 from lg_husky_sim.diagnosis.evidence.dispersion import dispersion
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
@@ -60,8 +61,8 @@ def eliminated(evidence: Evidence, plain: Point, final: Fit, found: Sequence[Hyp
         left, = others.gains_left(evidence, fit, [final], [loss])
         chance = chance_of(left, one, 1 if len(kept) > 1 else every, evidence, dispersion(
             evidence, final.whitened, final.jacobian[:, own]))
-        if is_beyond_chance(chance) and is_rather_real(
-                loss, evidence.count, one.effect):
+        if is_beyond_chance(chance) and (is_rather_real(
+                loss, evidence.count, one.effect) or relieves(fit, final)):
             break
         final = fit
         kept = [h for h in kept if h is not one]

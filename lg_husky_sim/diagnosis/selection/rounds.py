@@ -16,6 +16,7 @@ import itertools
 import math
 
 from lg_husky_sim.diagnosis.decision.adoption import is_beyond_chance, is_rather_real
+from lg_husky_sim.diagnosis.decision.strain import relieves
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit
 from lg_husky_sim.diagnosis.evidence.point import Point
 from lg_husky_sim.diagnosis.evidence.unknowns import loosened
@@ -51,7 +52,7 @@ class Round:
         Probability of such a gain on a robot that lacks nothing.
     looks : tuple of Look
     small : bool
-        Whether the best is beyond chance, but too little to be likely real.
+        Whether the best is beyond chance, but too little to be likely real, and no relief.
 
     """
 
@@ -227,7 +228,7 @@ def forward_step(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
     tried = _from_the_start(evidence, base, tried)
     chance = ranking.chance(tried[0])
     beyond = is_beyond_chance(chance)
-    small = beyond and not _is_real(tried[0])
+    small = beyond and not _is_real(tried[0]) and not relieves(base, tried[0].fit)
     return Round(evidence, base, tuple(tried), beyond and not small, chance, tuple(seen), small)
 
 

@@ -104,6 +104,22 @@ def strained(fit: Fit) -> tuple[Strained, ...]:
     return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
 
 
+def relieves(without: Fit, within: Fit) -> bool:
+    """
+    Return whether a robot that its tolerances do not allow is one that they do, with an effect.
+
+    What models and logs are always off by explains little of the readings, and so does an effect
+    that the robot's numbers have taken the place of: but these leave their tolerances by it.
+
+    Parameters
+    ----------
+    without, within : Fit
+        Without the effect and with it.
+
+    """
+    return bool(strained(without)) and not strained(within)
+
+
 def implausible_words(found: Sequence[Strained], added: bool) -> tuple[str, ...]:
     """
     Return the sentence on implausible parameters of the model that is the answer, or none.
