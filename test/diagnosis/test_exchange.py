@@ -111,6 +111,22 @@ def test_a_rival_does_not_move_the_onset_of_another_effect(
     assert {one.onset for one in found} <= {None, friction.onset}
 
 
+def test_an_effect_that_acts_always_begins_nowhere(counting: tuple[Evidence, Point]) -> None:
+    """It was adopted with an onset before others were found."""
+    evidence, plain = counting
+    pool = {h.label: h for h in hypotheses(plain.structure)}
+    late = pool['encoder_scale:left'].at(Onset(OnsetKind.TIME, 8.0, 'ahead'))
+    base = evidence.fit(plain)
+    final = evidence.fit(late.point(plain, late.starts[0]))
+    tried = Tried(late, final, base.cost - final.cost, evidence.count)
+    fit, rounds, found = exchanged(
+        evidence, plain, final, [Round(evidence, base, (tried,), True, 1e-9)], [late])
+    assert [(one.effect.id, one.onset) for one in found] == [('encoder_scale', None)]
+    assert fit.point.structure.onset is None
+    assert fit.cost < final.cost
+    assert rounds[0].tried[0].hypothesis == found[0]
+
+
 def test_a_side_stays_where_the_others_do_not_go_without_it(
         drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch) -> None:
     drives, model = drives_of([drive('ahead', 'nothing', 1)]), load_model()

@@ -30,7 +30,8 @@ def exchanged(evidence: Evidence, plain: Point, final: Fit, rounds: Sequence[Rou
     Exchange effects for others that make the log likelier.
 
     An effect was chosen under the noise and the reading of its round; what was found afterwards,
-    or how the log is read by then, may tell it better from its rivals.
+    or how the log is read by then, may tell it better from its rivals, or from itself without its
+    onset.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ def exchanged(evidence: Evidence, plain: Point, final: Fit, rounds: Sequence[Rou
     for place, one in enumerate(found):
         rest = with_effects(plain, final.point, [h for h in kept if h is not one])
         others = [*((other, list(other.starts)) for other in one.other_sides),
-                  *_rivals(told[place], one, rest)]
+                  *_from_the_start(one, final), *_rivals(told[place], one, rest)]
         if not others:
             continue
         try:
@@ -83,6 +84,14 @@ def _price(evidence: Evidence, base: Fit, fit: Fit, one: Hypothesis) -> float:
     # Of its numbers, and what it gains by an accident [nats].
     return 0.5 * one.size * math.log(evidence.count) + accident(
         evidence, base.whitened, fit.whitened)
+
+
+def _from_the_start(one: Hypothesis, final: Fit) -> list[tuple[Hypothesis, list[Numbers]]]:
+    # One that begins somewhere, if it acts always, from the numbers that it has.
+    if one.onset is None or one.effect.kind.needs_onset:
+        return []
+    values = final.point.values
+    return [(one.at(None), [{p.name: values[p.name] for p in one.free}])]
 
 
 def _rivals(one: Round, adopted: Hypothesis, rest: Point
