@@ -30,7 +30,7 @@ LAYOUT = {'STATES', 'BALANCES', 'NEUTRAL', 'LEAST_CHANCE', 'TOGETHER', 'ROWS', '
 NAMED = {
     'conclusion.py': {'yaw_pull'},
     'wording.py': {'sensor_time_offset'},
-    'before_after/base_robot.py': {'current_limit'},
+    'before_after/base_names.py': {'current_limit'},
     'before_after/conclusion.py': {'gyro_sign'},
     'before_after/prediction.py': {'gyro_bias'},
     'before_after/runnable.py': {'command_latency', 'command_slew', 'coulomb_drivetrain',

@@ -19,7 +19,7 @@ from lg_husky_sim.diagnosis.selection.laws import Laws
 from lg_husky_sim.diagnosis.selection.rounds import calibrated
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.errors import LgHuskyError
-from lg_husky_sim.husky.effects import Effect
+from lg_husky_sim.husky.effects import Effect, Onset, OnsetKind
 from lg_husky_sim.husky.model import compile_model
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
@@ -120,6 +120,32 @@ def test_what_a_command_does_depends_on_no_side(
         base = evidence.fit(point, rounds=1)
         Laws(start, found).gains_left(evidence, base, [base], [1.0])
     assert [any(name.endswith('_left') for name in which) for which in asked] == [sides]
+
+
+def test_what_begins_somewhere_may_act_always(
+        drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it would do elsewhere is no further effect, if laws are exact otherwise, too."""
+    monkeypatch.setattr(laws, 'setting', lambda name: 0.0 if name in (
+        'form_off', 'law_off') else setting(name))
+    model = load_model()
+    drives = drives_of([drive('ahead', 'nothing', 1)])
+    start = beginning(model.structure, base_unknowns(model.parameters, drives),
+                      model.parameters, Reading())
+    always = next(h for h in hypotheses(model.structure) if h.effect == BAND)
+    late = always.at(Onset(OnsetKind.TIME, 9.0, 'ahead'))
+    with Threads(1) as pool:
+        evidence = evidence_of(drives, ['ahead'], start, first_guess(drives), pool)
+        for found, most, least in ((late, 0.2, 0.0), (always, 1.0, 0.8)):
+            base = evidence.fit(found.point(start, {'dead_voltage': 0.5}), rounds=0)
+            base = replace(base, jacobian=evidence.fit(base.point, rounds=1).jacobian)
+            change = evidence.residuals(evidence.predict(
+                always.point(start, {'dead_voltage': 0.5}))) - evidence.residuals(
+                    evidence.predict(late.point(start, {'dead_voltage': 0.5})))
+            # Half of it is in the readings.
+            there = replace(base, whitened=base.whitened + 0.5 * change)
+            other = replace(base, whitened=base.whitened)
+            part, = Laws(start, [found]).gains_left(evidence, there, [other], [1.0])
+            assert least <= part <= most
 
 
 def test_a_robot_that_runs_away_without_what_was_found_is_judged_all_the_same(

@@ -17,7 +17,9 @@ what a further effect gains by the change d of the readings that it makes, there
 
     (d' V e)^2 / (d' V d)  over  (d' e)^2 / (d' d),   V = (I + s^2 M M' + b^2 diag(c^2))^-1
 
-where the numbers of the robot are projected out of all of them. Errors of sensors are exact.
+where the numbers of the robot are projected out of all of them. Errors of sensors are exact. What
+begins at a time or a place may act always, all the same: what it would change elsewhere is one
+more column of M, with the deviation 1.
 """
 
 from __future__ import annotations
@@ -96,8 +98,9 @@ class Laws:
             # It runs away without them: there is nothing that they could be a part of.
             return list(gains)
         made = without - base.whitened
-        columns = setting('law_off') * made[:, None] * _shapes(
-            evidence, base, WHOLE if parts == {Subsystem.COMMAND} else (*WHOLE, *SIDES))
+        columns = np.hstack([self._elsewhere(evidence, base), setting('law_off') * made[
+            :, None] * _shapes(evidence, base, WHOLE if parts == {Subsystem.COMMAND} else (
+                *WHOLE, *SIDES))])
         trust = 1.0 / np.sqrt(1.0 + (setting('form_off') * made) ** 2)
         exact, loose = Projection(base), Projection(replace(
             base, whitened=trust * base.whitened, jacobian=trust[:, None] * base.jacobian))
@@ -112,6 +115,18 @@ class Laws:
                 float(slope[0]) ** 2 / float(normal[0, 0])), 1.0)
         return [left(base.whitened - other.whitened) * gain
                 for other, gain in zip(others, gains, strict=True)]
+
+    def _elsewhere(self, evidence: Evidence, base: Fit) -> FloatArray:
+        # What those that begin somewhere would do if they acted always, shape (n, 0 or 1).
+        if all(h.onset is None or h.effect.kind.needs_onset for h in self.found):
+            return np.zeros((base.whitened.size, 0))
+        always = with_effects(self.plain, base.point, [
+            h if h.effect.kind.needs_onset else h.at(None) for h in self.found])
+        try:
+            return np.asarray(
+                base.whitened - evidence.residuals(evidence.predict(always)))[:, None]
+        except LgHuskyError:
+            return np.zeros((base.whitened.size, 0))
 
 
 def _shapes(evidence: Evidence, base: Fit, names: Sequence[str]) -> FloatArray:
