@@ -71,7 +71,7 @@ def test_another_harmonic_is_a_ripple_and_what_is_mainly_another_law_is_unknown(
             h.effect.id, h.effect.side) == ('torque_ripple', 'right')]
         one = forward_step(evidence, fit, named, None)
         assert one.adopted
-        search = Search(one.base, one.tried[0].fit, one.evidence, (one,),
+        search = Search(one.base, one.evidence.fit(one.tried[0].fit.point), one.evidence, (one,),
                         (one.tried[0].hypothesis,))
         said = answer(search, left_over(search.evidence, search.final),
                       missing_efforts(search.evidence, search.final))

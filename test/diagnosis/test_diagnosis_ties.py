@@ -7,6 +7,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+from lg_husky_sim.diagnosis.evidence.evidence import Fit
 from lg_husky_sim.diagnosis.hypotheses.hypothesis import hypotheses
 from lg_husky_sim.diagnosis.selection import rounds
 from lg_husky_sim.diagnosis.selection.ties import is_near
@@ -26,8 +27,9 @@ def _evidence() -> Any:
 
 
 def _fit(whitened: Any) -> Any:
-    point = SimpleNamespace(places=np.zeros(1))
-    return SimpleNamespace(whitened=np.asarray(whitened, dtype=np.float64), point=point)
+    point: Any = SimpleNamespace(places=np.zeros(1))
+    errors = np.asarray(whitened, dtype=np.float64)
+    return Fit(point, 0.0, errors, np.zeros((errors.size, 1)), (), ())
 
 
 def test_a_difference_within_its_own_noise_tells_nothing_apart() -> None:

@@ -12,7 +12,6 @@ from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 #: Innovations of a drive when its base is driven by other commands than those of the log.
 Score = Callable[[TimeSeries], FloatArray]
@@ -26,8 +25,9 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
     Where the wheels leave a simulation by far more than noise, a command is taken out, acts later,
     or is put into a gap between those before and after it, if that makes the drive likelier by a
     stated gain: whichever does most, less what its numbers cost, which are half of the logarithm
-    of the number of readings each. Of few commands only: up to a stated share, and of those that
-    change anything, which are the ones of which it shows, no more than chance takes of that share.
+    of the number of readings each. Of few commands only: up to a stated share of all, and of those
+    that change anything, which are the ones of which it shows. What is late more often than that
+    is late for a reason.
 
     Parameters
     ----------
@@ -50,11 +50,10 @@ def repaired(logged: TimeSeries, whitened: FloatArray, wheels: NDArray[np.bool_]
     """
     stamps = logged.times
     changes = int(np.count_nonzero(np.any(np.diff(logged.values, axis=0) != 0.0, axis=1)))
-    if stamps.size <= 3 or not changes:
+    if stamps.size <= 3:
         return logged
-    share = setting('missed_share')
-    most = min(int(share * stamps.size) + 1, math.ceil(
-        special.bdtrik(1.0 - setting('false_alarm_rate'), changes, share)))
+    most = min(int(setting('missed_share') * stamps.size) + 1,
+               int(setting('missed_changes') * changes))
     best, e, cost = logged, whitened, student.cost(whitened)
     tried: set[int] = set()
     for _ in range(most):
