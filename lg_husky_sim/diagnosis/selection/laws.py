@@ -126,6 +126,7 @@ class Laws:
             return np.asarray(
                 base.whitened - evidence.residuals(evidence.predict(always)))[:, None]
         except LgHuskyError:
+            # It runs away where it acts always: it does not.
             return np.zeros((base.whitened.size, 0))
 
 
