@@ -11,12 +11,13 @@ from lg_husky_sim.diagnosis.before_after.base import Base, base_of
 from lg_husky_sim.diagnosis.before_after.drives import Drive, drives
 from lg_husky_sim.diagnosis.before_after.fitting import Prior
 from lg_husky_sim.diagnosis.before_after.motion import moved
-from lg_husky_sim.diagnosis.before_after.prediction import predicted
+from lg_husky_sim.diagnosis.before_after.prediction import predicted, residual, residuals
 from lg_husky_sim.diagnosis.before_after.recording_fits import RecordingFits
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.before_after.ticks import at_own_ticks, likelier
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise
 from lg_husky_sim.diagnosis.evidence.clock_search import at_ticks
+from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model_file import load_model
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.signals import TimeSeries
@@ -91,6 +92,20 @@ def test_ticks_are_found_by_the_wheels_of_both_sets(pool: Threads) -> None:
 def test_a_base_that_takes_commands_as_they_come_gets_these(pool: Threads) -> None:
     one = sent(3)
     assert at_own_ticks(fitted(driven(one, one.command)), pool) is None
+
+
+def test_robots_side_by_side_get_commands_of_their_own() -> None:
+    """More of them than go together, to the bits that each has alone."""
+    one, of = sent(4), base()
+    commands = [at_ticks(one.command, 0.03 + 0.005 * k, 0.0) for k in range(20)]
+    together = residuals(of, one, 20 * [of.start], commands)
+    for got, left in zip(commands, together, strict=True):
+        alone = residual(of, replace(one, command=got), of.start)
+        for stream, rows in alone.items():
+            np.testing.assert_array_equal(left[stream], rows)
+    assert not np.array_equal(together[0]['wheels'], together[19]['wheels'])
+    # Clocks are tried in as many as that.
+    assert setting('clock_batch') == of.settings.simulation['lanes']
 
 
 def test_of_two_fits_the_one_counts_that_leaves_less() -> None:
