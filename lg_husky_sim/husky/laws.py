@@ -92,6 +92,10 @@ class Law(enum.IntEnum):
     """f = sgn(z0) max(|z0| - p0, 0)/p1: rate at which what holds p0 slips under a torque z0."""
     SOFT_BAND = 19
     """f = -z0 exp(-(z0/p0)^2): little passes below p0 and all well above."""
+    SOFT_CLIP = 20
+    """f = ((1 + |z0/p0|^3)^(-1/3) - 1) z0: comes to +-p0 little by little."""
+    SOFT_CURRENT_LIMIT = 21
+    """f = ((1 + |v/(p1 p0)|^3)^(-1/3) - 1) v, v = z0 - p2 z1: |i| comes to p0 little by little."""
 
 
 #: The laws as expressions of the linear graph: arguments z1, z2, ..., coefficients p0, p1, ...
@@ -119,6 +123,9 @@ EXPRESSIONS = {
     Law.FRICTION_CIRCLE: (
         '(1/(1+(((p1*z1)**2+(p2*z2)**2)/p0**2)**1.5)**0.3333333333333333-1)*p1*z1'),
     Law.SOFT_BAND: '-z1*exp(-(z1/p0)**2)',
+    Law.SOFT_CLIP: '(1/(1+((z1/p0)**2)**1.5)**0.3333333333333333-1)*z1',
+    Law.SOFT_CURRENT_LIMIT: (
+        '(1/(1+(((z1-p2*z2)/(p1*p0))**2)**1.5)**0.3333333333333333-1)*(z1-p2*z2)'),
     Law.YIELDING: '(2*z1+abs(z1-p0)-abs(z1+p0))/(2*p1)',
     Law.STICTION: (
         '-p0/p1*(held+p4*z1*(exp(-2*(z2/p3)**2)-(held/p1)**2'
@@ -132,9 +139,9 @@ REMEMBERING = (Law.HEATING, Law.STICTION)
 #: law's number; 0 for a law that is not in the series.
 WINDING = 5
 PLACES = np.array([{
-    Law.DEAD_ZONE: 1, Law.DEAD_BAND: 1, Law.SOFT_BAND: 1, Law.CLIP: 2, Law.DROOP: 3,
-    Law.BUS_SAG: 3, Law.CURRENT_LIMIT: 4, Law.HEATING: WINDING}.get(law, 0) for law in Law],
-    dtype=np.int64)
+    Law.DEAD_ZONE: 1, Law.DEAD_BAND: 1, Law.SOFT_BAND: 1, Law.CLIP: 2, Law.SOFT_CLIP: 2,
+    Law.DROOP: 3, Law.BUS_SAG: 3, Law.CURRENT_LIMIT: 4, Law.SOFT_CURRENT_LIMIT: 4,
+    Law.HEATING: WINDING}.get(law, 0) for law in Law], dtype=np.int64)
 #: Names in the expressions that are signals, not parameters.
 SIGNALS = ('heading', 'angle', 'time', 'heat', 'table', 'held')
 
@@ -142,6 +149,13 @@ SIGNALS = ('heading', 'angle', 'time', 'heat', 'table', 'held')
 @jit_part
 def _clip(value: float, lower: float, upper: float) -> float:
     return max(lower, min(upper, value))
+
+
+@jit_part
+def _softly(value: float, limit: float) -> float:
+    # What is added to a value so that it comes to a limit little by little.
+    share = abs(value) / limit
+    return float(((1.0 + share * share * share) ** (-1.0 / 3.0) - 1.0) * value)
 
 
 @jit_part
@@ -213,8 +227,10 @@ def _source_law(c: int, j: int, laws: NDArray[np.int64], coefficients: FloatArra
         own = _clip(own, -ceiling, ceiling)
     if motor > 0.0 and law != 13:
         own += _given(c, j, motor, laws, coefficients, out)
-    if law == 7:
+    if law == 7 or law == 21:
         back = p2 * z[o + 1] - _heated(c, j, motor, laws, coefficients, out)
+        if law == 21:
+            return _softly(own - back, p1 * p0)
         return _clip(own, back - p1 * p0, back + p1 * p0) - own
     if law == 8:
         return math.copysign(max(abs(own) - p0, 0.0), own) - own
@@ -224,6 +240,8 @@ def _source_law(c: int, j: int, laws: NDArray[np.int64], coefficients: FloatArra
         return -own * math.exp(-(own / p0) ** 2) if p0 > 0.0 else 0.0
     if law == 10:
         return _clip(own, -p0, p0) - own
+    if law == 20:
+        return _softly(own, p0)
     if law == 11:
         other: float = z[o + 1]
         if ceiling > 0.0:

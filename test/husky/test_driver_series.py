@@ -35,6 +35,8 @@ SIZES: dict[str, dict[str, float]] = {
 }
 """Sizes at which each takes volts away in the drive below."""
 FORMS = ('zone', 'band', 'soft')
+"""Of the dead band; with the last one, limits are soft as well."""
+LIMITS = ('voltage_saturation', 'current_limit')
 PAIRS = [*itertools.combinations(SIZES, 2), tuple(SIZES)]
 STAMPS = np.array([0.0, 0.31, 0.64, 0.98, 1.3, 1.71])
 TWISTS = np.array([[0.5, 0.2], [0.1, 0.1], [-0.9, 0.6], [0.7, -0.5], [0.04, 0.06], [0.9, 0.9]])
@@ -45,8 +47,8 @@ COMMANDS = TimeSeries(STAMPS, TWISTS, ('forward', 'yaw'))
 def structure_of(names: tuple[str, ...], form: str = 'zone', also: str = '') -> Structure:
     structure = Structure()
     for name in names:
-        structure = structure.with_effect(
-            Effect(name, shape=form if name == 'driver_deadband' else ''))
+        shaped = name == 'driver_deadband' or (name in LIMITS and form == 'soft')
+        structure = structure.with_effect(Effect(name, shape=form if shaped else ''))
     return structure.with_effect(Effect(also)) if also else structure
 
 
@@ -57,6 +59,13 @@ def robot(structure: Structure) -> tuple[Plant, dict[str, float]]:
         name: value for sizes in SIZES.values() for name, value in sizes.items()
         if name in parameters})
     return compile_model(structure).at(parameters), dict(parameters.items())
+
+
+def limited(size: float, limit: float, form: str) -> float:
+    """Return a size that a limit holds back."""
+    if form == 'soft' and math.isfinite(limit):
+        return float(size / (1.0 + (size / limit) ** 3) ** (1.0 / 3.0))
+    return min(size, limit)
 
 
 def winding_voltages(asked: FloatArray, rates: FloatArray, currents: FloatArray,
@@ -73,7 +82,7 @@ def winding_voltages(asked: FloatArray, rates: FloatArray, currents: FloatArray,
             size *= 0.5 * (1.0 + math.tanh((size - dead) / p['dead_edge']))
         elif dead:
             size *= 1.0 - math.exp(-(size / dead) ** 2)
-        duty[side] = math.copysign(min(size, p.get('clip_voltage', math.inf)), volts)
+        duty[side] = math.copysign(limited(size, p.get('clip_voltage', math.inf), form), volts)
     duty /= p['supply_voltage']
     lost = min(p.get('droop_rate', 0.0) * time, p.get('droop_floor', 0.0))
     bus = p['supply_voltage'] * (1.0 - lost) - p.get('bus_resistance', 0.0) * (duty @ currents)
@@ -84,7 +93,9 @@ def winding_voltages(asked: FloatArray, rates: FloatArray, currents: FloatArray,
     if 'current_limit' in p:
         warm = (ohms - p['motor_resistance']) * currents
         room = p['motor_resistance'] * p['current_limit']
-        given = np.clip(given, back + warm - room, back + warm + room)
+        free = given - back - warm
+        given = back + warm + np.array([math.copysign(limited(abs(one), room, form), one)
+                                        for one in free])
     return np.asarray(given - (ohms - p['motor_resistance']) * currents)
 
 

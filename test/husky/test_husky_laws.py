@@ -17,12 +17,12 @@ COEFFICIENTS = {
     Law.COULOMB: 4, Law.QUADRATIC: 1, Law.WHILE_MOVING: 2, Law.MODULATED_DAMPING: 1,
     Law.HEADING: 2, Law.WHEEL_PHASE: 8, Law.SLIP_SATURATION: 2, Law.CURRENT_LIMIT: 3,
     Law.DEAD_ZONE: 1, Law.DEAD_BAND: 2, Law.SOFT_BAND: 1, Law.CLIP: 1, Law.BUS_SAG: 2,
-    Law.DROOP: 2,
+    Law.DROOP: 2, Law.SOFT_CLIP: 1, Law.SOFT_CURRENT_LIMIT: 3,
     Law.HEATING: 3, Law.BACKLASH: 2, Law.FRICTION_CIRCLE: 3, Law.STICTION: 5,
     Law.YIELDING: 2,
 }
-ARGUMENTS = {Law.MODULATED_DAMPING: 2, Law.CURRENT_LIMIT: 2, Law.BUS_SAG: 4, Law.BACKLASH: 2,
-             Law.FRICTION_CIRCLE: 2, Law.STICTION: 2}
+ARGUMENTS = {Law.MODULATED_DAMPING: 2, Law.CURRENT_LIMIT: 2, Law.SOFT_CURRENT_LIMIT: 2,
+             Law.BUS_SAG: 4, Law.BACKLASH: 2, Law.FRICTION_CIRCLE: 2, Law.STICTION: 2}
 SIDED = (Law.WHEEL_PHASE, Law.HEATING, Law.STICTION)
 
 
@@ -93,6 +93,19 @@ def test_current_limit_holds_the_current() -> None:
         assert (added == 0.0) == (abs(free) <= limit)
 
 
+def test_a_soft_current_limit_comes_to_it_little_by_little() -> None:
+    limit, resistance, transmission = 5.0, 0.4, 3.5
+    p = np.array([limit, resistance, transmission])
+
+    def current(free: float, rate: float) -> float:
+        volts = resistance * free + transmission * rate
+        added = opcode(Law.SOFT_CURRENT_LIMIT, p, np.array([volts, rate]))
+        return (volts + added - transmission * rate) / resistance
+    assert current(0.5, 3.0) == pytest.approx(0.5, rel=1e-3)
+    assert current(-5.0, 1.0) == pytest.approx(-5.0 / 2.0 ** (1.0 / 3.0))
+    assert current(500.0, -2.0) == pytest.approx(5.0, rel=1e-3)
+
+
 def test_voltage_laws() -> None:
     def reached(law: Law, p: list[float], volts: float) -> float:
         return volts + opcode(law, np.array(p), np.array([volts]))
@@ -102,6 +115,11 @@ def test_voltage_laws() -> None:
             math.copysign(max(abs(volts) - 2.0, 0.0), volts))
         assert reached(Law.DEAD_BAND, [2.0, 0.05], volts) == pytest.approx(
             volts if abs(volts) > 2.0 else 0.0, abs=1e-12)
+        assert reached(Law.SOFT_CLIP, [10.0], 100.0 * volts) == pytest.approx(
+            math.copysign(10.0, volts) if volts else 0.0, rel=0.05)
+        assert reached(Law.SOFT_CLIP, [10.0], 0.05 * volts) == pytest.approx(
+            0.05 * volts, rel=4e-4)
+    assert reached(Law.SOFT_CLIP, [10.0], -10.0) == pytest.approx(-10.0 / 2.0 ** (1.0 / 3.0))
     assert reached(Law.SOFT_BAND, [2.0], 2.0) == pytest.approx(2.0 - 2.0 / math.e)
     assert reached(Law.SOFT_BAND, [2.0], -15.0) == pytest.approx(-15.0)
 

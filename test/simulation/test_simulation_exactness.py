@@ -137,6 +137,7 @@ def test_efforts_agree_with_scipy(robot: Maker, effect: str) -> None:
 @pytest.mark.parametrize(('effect', 'values'), [
     ('battery_droop', {'droop_rate': 0.02}),
     ('voltage_saturation', {'clip_voltage': 8.0}),
+    (Effect('voltage_saturation', shape='soft'), {'clip_voltage': 8.0}),
     (Effect('driver_deadband', shape='zone'), {'dead_voltage': 2.0}),
     (Effect('driver_deadband', shape='band'), {'dead_voltage': 6.0}),
     (Effect('driver_deadband', shape='soft'), {'dead_voltage': 3.0}),

@@ -61,7 +61,7 @@ def _behind_others(network: EditedNetwork, row: LawRow, of: tuple[str, ...]
         if name.startswith('V(V_S'):
             with_sources(argument, int(name[-2]), '+{}',
                          lambda other: PLACES[other.law] < PLACES[row.law])
-    if row.law is Law.CURRENT_LIMIT:
+    if row.law in (Law.CURRENT_LIMIT, Law.SOFT_CURRENT_LIMIT):
         with_sources(1, row.motor, '-{}/p2', lambda other: other.law is Law.HEATING)
     return tuple(names), meant
 
@@ -76,13 +76,14 @@ def _droop(effect: Effect, number: str, other: str, side: float, rotor: str) -> 
 
 
 def _current_limit(effect: Effect, number: str, other: str, side: float, rotor: str) -> _Series:
-    row = LawRow(Law.CURRENT_LIMIT,
-                 ('current_limit', 'motor_resistance', 'torque_constant*gear_ratio'))
+    law = Law.CURRENT_LIMIT if effect.shape == 'hard' else Law.SOFT_CURRENT_LIMIT
+    row = LawRow(law, ('current_limit', 'motor_resistance', 'torque_constant*gear_ratio'))
     return row, (f'V(V_S{number})', f'omega({rotor})')
 
 
 def _clip(effect: Effect, number: str, other: str, side: float, rotor: str) -> _Series:
-    return LawRow(Law.CLIP, ('clip_voltage',)), (f'V(V_S{number})',)
+    law = Law.CLIP if effect.shape == 'hard' else Law.SOFT_CLIP
+    return LawRow(law, ('clip_voltage',)), (f'V(V_S{number})',)
 
 
 def _heating(effect: Effect, number: str, other: str, side: float, rotor: str) -> _Series:
