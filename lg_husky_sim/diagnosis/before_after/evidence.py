@@ -70,6 +70,12 @@ class Quadratic:
                        cost=self.cost + 0.5 * more * at ** 2,
                        lasting={**self.lasting, k: lasting} if more > 0.0 else self.lasting)
 
+    def told(self, sd: FloatArray) -> FloatArray:
+        """Return what it says of each parameter (inverse variance), of a prior of these sd."""
+        precision = self.curvature + np.diag(sd ** -2)
+        return np.asarray(np.maximum(
+            1.0 / np.diag(np.linalg.inv(precision)) - sd ** -2, 0.0), dtype=np.float64)
+
     def flatter(self, k: int, by: float) -> Quadratic:
         """Return this with so many times the curvature along a parameter, about its place."""
         at, scale = self.place, np.ones(self.place.size)

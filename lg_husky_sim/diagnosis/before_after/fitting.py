@@ -78,7 +78,8 @@ def whites(base: Base, drives: Sequence[Drive], noise: Noise, z: FloatArray,
 
 
 def _cost(errors: Sequence[FloatArray], prior: Prior, z: FloatArray) -> float:
-    total = 0.5 * sum(float(e @ e) for e in errors) + prior.cost(z)
+    with np.errstate(over='ignore'):
+        total = 0.5 * sum(float(e @ e) for e in errors) + prior.cost(z)
     return total if np.isfinite(total) else float(np.inf)
 
 

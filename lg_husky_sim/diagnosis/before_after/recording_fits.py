@@ -20,6 +20,7 @@ from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, joined, Quadratic
 from lg_husky_sim.diagnosis.before_after.fitting import costs_at, fit_set, Prior, SetFit
 from lg_husky_sim.diagnosis.before_after.limits import with_limits
+from lg_husky_sim.diagnosis.before_after.middle import middle
 from lg_husky_sim.diagnosis.before_after.prediction import (
     CHANNELS,
     jacobian,
@@ -199,10 +200,11 @@ def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequ
     share(0.4)
     noise = _renewed(base, groups, places, replace(prior, sd=wide), noise, pool)
     for turn, until in enumerate((roughly, enough)):
-        middle = _middle(base, prior, wide, {
-            name: place - lags[name] for name, place in places.items()})
-        about = Prior(middle, wide, prior.free)
-        ends = {'': middle, **{name: place - lags[name] for name, place in places.items()}}
+        mean = middle(base, prior, wide, {
+            name: place - lags[name] for name, place in places.items()},
+            _quadratics(base, groups, noise, prior, places, pool))
+        about = Prior(mean, wide, prior.free)
+        ends = {'': mean, **{name: place - lags[name] for name, place in places.items()}}
 
         def again(name: str, about: Prior = about, ends: Places = ends, places: Places = places,
                   until: float = until, turn: int = turn) -> FloatArray:
@@ -347,18 +349,4 @@ def _deviations(base: Base, prior: Prior, wide: FloatArray, places: Places,
     for k, quantity in enumerate(quantities):
         if quantity.name in base.settings.limits or k == base.reference:
             sd[k] = wide[k]
-    return Prior(_middle(base, prior, sd, places), sd, prior.free)
-
-
-def _middle(base: Base, prior: Prior, wide: FloatArray, places: Places) -> FloatArray:
-    # The likeliest mean of recordings that are where they are. What all of them together say by
-    # their derivatives would outweigh the prior of what is nearly free, and lead it far away.
-    several = np.array(list(places.values()))
-    z = np.array(prior.mean)
-    for k, quantity in enumerate(base.settings.quantities):
-        if prior.free[k]:
-            known, each = prior.sd[k] ** -2, wide[k] ** -2
-            z[k] = (known * z[k] + each * several[:, k].sum()) / (known + each * len(several))
-            if quantity.name in base.settings.limits:
-                z[k] = several[:, k].max()
-    return np.clip(z, *base.bounds())
+    return Prior(middle(base, prior, sd, places, quadratics), sd, prior.free)
