@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 from lg_husky_sim.diagnosis.before_after.base import Base, base_of
 from lg_husky_sim.diagnosis.before_after.drives import all_drives
-from lg_husky_sim.diagnosis.before_after.fitting import costs_at, fit_set, Prior
+from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior, raced
 from lg_husky_sim.diagnosis.before_after.prediction import residual
 from lg_husky_sim.diagnosis.before_after.runnable import fitted, started
 from lg_husky_sim.diagnosis.before_after.settings import settings
@@ -104,11 +104,8 @@ def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
     base = replace(base, start=start)
     prior = Prior(base.start, base.sd, np.ones(start.size, dtype=np.bool_))
     noise = first_noise(known)
-    options = _options(base)
-    costs = costs_at(base, drives, prior, noise, options, pool.map)
-    z = options[int(np.argmin(costs))]
-    steps, rough = int(setting('base_steps')), known.fit['roughly']
-    z = fit_set(base, drives, prior, noise, z, steps, rough, pool.map).z
+    steps, rough = int(known.fit['steps']), known.fit['roughly']
+    z = raced(base, drives, prior, noise, [[one] for one in _options(base)], rough, pool.map).z
     noise = noise_of([residual(base, d, z) for d in drives],
                      [d.vigour for d in drives], known, base.given)
     z = fit_set(base, drives, prior, noise, z, steps, rough, pool.map).z

@@ -138,7 +138,8 @@ def diagnose(recordings: Sequence[Recording], nominal: ModelFile, progress: Prog
         different = different or impossible(found.final, nominal.parameters)
         progress('smooth efforts', 0.85)
         left = remaining(found)
-        rest = left_over(left.evidence, left.final)
+        # What a model of another robot leaves of this one needs no words.
+        rest = () if different else left_over(left.evidence, left.final)
         free = missing_efforts(left.evidence, left.final)
         progress('intervals', 0.9)
         said, features = _diagnosis(found, left, rest, free, parts, nominal, there)

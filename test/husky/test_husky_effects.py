@@ -290,6 +290,10 @@ def test_pull_slope_and_payload(robot: Maker) -> None:
     assert last(pulled, STRAIGHT, 'yaw_rate') > 0.01
     assert last(pulled, (-0.6, 0.0), 'yaw_rate') > 0.01  # to the same side
     assert last(pulled, (0.0, 0.0), 'yaw_rate') == 0.0
+    dragged = robot(Effect('yaw_pull', shape='dragging'), pull_moment=3.0)
+    assert last(dragged, STRAIGHT, 'yaw_rate') == pytest.approx(last(pulled, STRAIGHT, 'yaw_rate'))
+    assert last(dragged, (-0.6, 0.0), 'yaw_rate') < -0.01  # the other way in reverse
+    assert last(dragged, (0.0, 0.0), 'yaw_rate') == 0.0
     hill = robot('slope', slope_x=-20.0, slope_y=0.0)  # gravity pulls towards -x
     assert last(hill, STRAIGHT, 'forward') < last(robot(), STRAIGHT, 'forward')
     assert last(hill, (0.0, 0.0), 'x') < 0.0

@@ -167,3 +167,56 @@ def fit_set(base: Base, drives: Sequence[Drive], prior: Prior, noise: Noise, beg
         if begun - cost < enough:
             break
     return SetFit(z, cost)
+
+
+def raced(base: Base, drives: Sequence[Drive], about: Prior, noise: Noise,
+          kinds: Sequence[Sequence[FloatArray]], until: float, each: Mapper,
+          most: str = 'raced') -> SetFit:
+    """
+    Fit from the likeliest start of each kind, of the best few of which one goes on, by halving.
+
+    Of starts that are as likely as another, as a limit that is not reached is, that one is enough.
+
+    Parameters
+    ----------
+    base : Base
+        Robot to fit; its settings say how many start, and how many steps a round has.
+    drives : sequence of Drive
+        All are fitted at once.
+    about : Prior
+        Means and standard deviations of the parameters, and which are free.
+    noise : Noise
+        What residuals and derivatives are whitened with.
+    kinds : sequence of sequence of numpy.ndarray, shape (n,)
+        Starts by kind, on the scale of the estimates.
+    until : float
+        A step that gains less ends a fit [nats].
+    each : callable
+        Applies a function to the drives: `map`, or that of a pool.
+    most : str
+        Setting of ``fit`` that says how many start at most.
+
+    Returns
+    -------
+    SetFit
+
+    """
+    numbers = base.settings.fit
+
+    def fit(start: FloatArray, at_most: int) -> SetFit:
+        return fit_set(base, drives, about, noise, start, at_most, until, each)
+    costs = iter(costs_at(base, drives, about, noise, [
+        one for kind in kinds for one in kind], each))
+    ranked = [[(next(costs), k, one) for one in kind] for k, kind in enumerate(kinds)]
+    likeliest = [min(kind, key=lambda one: one[0]) for kind in ranked]
+    alive: list[FloatArray] = []
+    last = -np.inf
+    for cost, _, one in sorted(likeliest, key=lambda one: one[:2]):
+        if len(alive) < int(numbers[most]) and cost > last + numbers['enough']:
+            alive.append(one)
+            last = cost
+    while len(alive) > 1:
+        fits = sorted((fit(one, int(numbers['race_steps'])) for one in alive),
+                      key=lambda one: one.cost)
+        alive = [one.z for one in fits[:len(fits) // 2]]
+    return fit(alive[0], int(numbers['steps']))

@@ -18,7 +18,7 @@ from lg_husky_sim.diagnosis.before_after.base import Base
 from lg_husky_sim.diagnosis.before_after.dispersion import dispersed
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.diagnosis.before_after.evidence import Evidence, joined, Quadratic
-from lg_husky_sim.diagnosis.before_after.fitting import costs_at, fit_set, Prior, SetFit
+from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior, raced, SetFit
 from lg_husky_sim.diagnosis.before_after.limits import with_limits
 from lg_husky_sim.diagnosis.before_after.middle import middle
 from lg_husky_sim.diagnosis.before_after.prediction import (
@@ -155,11 +155,12 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
 
     def drawn(name: str) -> FloatArray:
         here = replace(about, mean=about.mean + lags[name])
-        own = _raced(base, groups[name], here, noise, [[places[name]], [here.mean]],
-                     numbers['enough'])
+        own = raced(base, groups[name], here, noise, [[places[name]], [here.mean]],
+                    numbers['enough'], map)
         ends = [[place - lags[other] + lags[name]] for other, place in places.items()
                 if other != name]
-        other = _raced(base, groups[name], here, noise, ends, numbers['enough']) if ends else own
+        other = raced(base, groups[name], here, noise, ends, numbers['enough'],
+                      map) if ends else own
         # Of optima that are as likely, its own.
         return other.z if own.cost - other.cost > numbers['enough'] else own.z
     ended = dict(zip(groups, pool.map(drawn, groups), strict=True))
@@ -191,8 +192,8 @@ def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequ
 
     def fitted(name: str, about: Prior, kinds: Sequence[Sequence[FloatArray]], until: float,
                most: str = 'raced') -> SetFit:
-        return _raced(base, groups[name], replace(about, mean=about.mean + lags[name]), noise,
-                      kinds, until, most)
+        return raced(base, groups[name], replace(about, mean=about.mean + lags[name]), noise,
+                     kinds, until, map, most)
     options = [*(start for start, _ in kinds),
                *_shifted(base, prior.free, first - lags[longest])]
     places = dict(zip(names, pool.map(lambda name: first if name == longest else fitted(
@@ -220,31 +221,6 @@ def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequ
         if not turn:
             noise = _renewed(base, groups, places, about, noise, pool)
     return places, noise, prior
-
-
-def _raced(base: Base, drives: Sequence[Drive], about: Prior, noise: Noise,
-           kinds: Sequence[Sequence[FloatArray]], until: float, most: str = 'raced') -> SetFit:
-    # From the likeliest start of each kind, of the best few of which one goes on: by halving. Of
-    # those that are as likely as another, as a limit that is not reached is, that one is enough.
-    numbers = base.settings.fit
-
-    def fit(start: FloatArray, at_most: int) -> SetFit:
-        return fit_set(base, drives, about, noise, start, at_most, until, map)
-    costs = iter(costs_at(base, drives, about, noise, [
-        one for kind in kinds for one in kind], map))
-    each = [[(next(costs), k, one) for one in kind] for k, kind in enumerate(kinds)]
-    likeliest = [min(kind, key=lambda one: one[0]) for kind in each]
-    alive: list[FloatArray] = []
-    last = -np.inf
-    for cost, _, one in sorted(likeliest, key=lambda one: one[:2]):
-        if len(alive) < int(numbers[most]) and cost > last + numbers['enough']:
-            alive.append(one)
-            last = cost
-    while len(alive) > 1:
-        fits = sorted((fit(one, int(numbers['race_steps'])) for one in alive),
-                      key=lambda one: one.cost)
-        alive = [one.z for one in fits[:len(fits) // 2]]
-    return fit(alive[0], int(numbers['steps']))
 
 
 def at_the_edge(base: Base, drives: Sequence[Drive]) -> Base:

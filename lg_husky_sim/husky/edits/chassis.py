@@ -64,6 +64,14 @@ def _pushing(store: Callable[[LinearGraph], Branch], row: LawRow, *of: str) -> E
     return Edit(apply)
 
 
+def _pull(network: EditedNetwork, effect: Effect) -> EditedNetwork:
+    # What drags on one side turns the other way in reverse.
+    row = LawRow(Law.WHILE_MOVING, ('pull_moment', 'pull_speed'))
+    if effect.shape == 'dragging':
+        row = LawRow(Law.COULOMB, ('-pull_moment', 'pull_speed', 0.0, 1.0))
+    return _pushing(_turning, row, _FORWARD).apply(network, effect)
+
+
 EDITS = {
     'payload': Edit(_payload, Stage.VALUES),
     'terrain_change': Edit(_terrain, Stage.VALUES),
@@ -76,6 +84,5 @@ EDITS = {
         'omega({own})'),
     'yaw_scrub_speed': _pushing(
         scrubbing, LawRow(Law.MODULATED_DAMPING, ('scrub_slope',)), 'omega({own})', _FORWARD),
-    'yaw_pull': _pushing(
-        _turning, LawRow(Law.WHILE_MOVING, ('pull_moment', 'pull_speed')), _FORWARD),
+    'yaw_pull': Edit(_pull),
 }
