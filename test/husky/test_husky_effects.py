@@ -139,6 +139,8 @@ NEUTRAL: list[tuple[Effect, dict[str, float]]] = [
     (Effect('yaw_scrub_speed'), {'scrub_slope': 0.0}),
     (Effect('yaw_pull'), {'pull_moment': 0.0}),
     (Effect('terrain_change'), {'wheel_damping_change': 0.0, 'yaw_damping_change': 0.0}),
+    (Effect('terrain_change', shape='ground'), {
+        'wheel_damping_change': 0.0, 'yaw_damping_change': 0.0, 'floor_drag': 0.0}),
     (Effect('gyro_bias'), {'gyro_bias': 0.0}),
     (Effect('gyro_scale'), {'gyro_factor': 1.0}),
     *((Effect('encoder_scale', side), {'encoder_factor': 1.0}) for side in ('left', 'right')),
@@ -283,6 +285,17 @@ def test_a_stiffer_side_stays_so_on_other_ground(
             p.parameter(values[p.name]) for e in structure.effects for p in e.parameters()))
         matrices.append(compile_model(structure).at(parameters).sets[0].a)
     np.testing.assert_allclose(matrices[0], matrices[1], rtol=1e-12)
+
+
+def test_a_floor_that_also_resists_is_damping_with_rolling_resistance(robot: Maker) -> None:
+    damping = {'wheel_damping_change': 0.4, 'yaw_damping_change': 1.5}
+    ground = driven(robot(Effect('terrain_change', shape='ground'), floor_drag=12.0, **damping),
+                    *WANDER)
+    both = driven(robot('terrain_change', 'rolling_resistance', rolling_force=12.0, **damping),
+                  *WANDER)
+    np.testing.assert_allclose(ground.values, both.values, atol=1e-9)
+    alone = driven(robot('terrain_change', **damping), *WANDER)
+    assert np.abs(ground.values - alone.values).max() > 0.01
 
 
 def test_pull_slope_and_payload(robot: Maker) -> None:

@@ -39,16 +39,20 @@ def _payload(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     return network.with_values(heavier)
 
 
+def _base(graph: LinearGraph) -> Branch:
+    return branch_of(graph, 'M_H')
+
+
 def _terrain(network: EditedNetwork, effect: Effect) -> EditedNetwork:
     if effect.shape == 'grip':
         return replace(network, grip=f'{network.grip}*(1+grip_change)')
     slip, scrub = '(1+wheel_damping_change)', '(1+yaw_damping_change)'
-    return replace(network.with_values(_ground(network, slip, scrub)),
-                   grip=f'{network.grip}*{scrub}')
-
-
-def _base(graph: LinearGraph) -> Branch:
-    return branch_of(graph, 'M_H')
+    network = replace(network.with_values(_ground(network, slip, scrub)),
+                      grip=f'{network.grip}*{scrub}')
+    if effect.shape == 'damping':
+        return network
+    row = LawRow(Law.COULOMB, ('floor_drag', 'floor_drag_speed', 0.0, 1.0))
+    return network.with_effort_on(f'F_{effect.id}', _base(network.graph), row, _FORWARD)
 
 
 def _turning(graph: LinearGraph) -> Branch:
