@@ -45,12 +45,15 @@ if TYPE_CHECKING:
 @click.option('--calibrate', is_flag=True,
               help='With --from: print the maximum-likelihood coefficients of the confidence for '
                    'these outcomes, in the form of diagnosis.yaml.')
+@click.option('--keep-slopes', is_flag=True,
+              help='With --calibrate: fit only how often an answer is right; what informs about '
+                   'it keeps its coefficients.')
 @click.option('--page', type=click.Path(path_type=Path), metavar='FILE.md',
               help='Also write the results as a page, with pictures and outcomes next to it.')
 def command(
     cases: int, seed: int | None, tuning: bool, world: str, jobs: int, out: Path | None,
     given: Path | None, held_out: bool, generate_only: bool, score_only: bool,
-    sources: tuple[Path, ...], calibrate: bool, page: Path | None,
+    sources: tuple[Path, ...], calibrate: bool, keep_slopes: bool, page: Path | None,
 ) -> None:
     """
     Run a blind trial of the diagnosis on robots with injected effects.
@@ -65,11 +68,14 @@ def command(
 
     if calibrate and not sources:
         raise misused('--calibrate needs --from FILE.jsonl: outcomes to calibrate on')
+    if keep_slopes and not calibrate:
+        raise misused('--keep-slopes needs --calibrate')
     if sources and calibrate:
         from lg_husky_sim.proof.calibration import calibrated
 
         rows = [row for path in sources for row in outcomes.read(path)[1]]
-        for name, (value, cases, right) in calibrated(rows).items():
+        for name, (value, cases, right) in calibrated(
+                rows, _slopes() if keep_slopes else None).items():
             click.echo(f'{name}: {value:.2f}  # {right} of {cases} right')
         return
     if sources:
@@ -85,6 +91,17 @@ def command(
     if path is not None:
         _report([(path, *outcomes.read(path))], page, ())
         click.echo(f'details: {path}')
+
+
+def _slopes() -> dict[str, float]:
+    # All coefficients of the confidence but its constants, as they are.
+    from lg_husky_sim.diagnosis.before_after.settings import settings
+    from lg_husky_sim.diagnosis.settings import setting
+    from lg_husky_sim.proof.calibration import COEFFICIENTS
+
+    decided = settings().decision
+    return {name: decided[name] if name in decided else setting(name)
+            for names in COEFFICIENTS.values() for name in names[1:]}
 
 
 def _trial(cases: int, seed: int | None, tuning: bool, world: str, jobs: int, out: Path,

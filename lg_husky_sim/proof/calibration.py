@@ -125,7 +125,8 @@ def _names(line: Json) -> list[tuple[list[float], bool]]:
     return [(_told(one, line['features']), one['effect'] in true) for one in said]
 
 
-def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
+def calibrated(lines: Sequence[Json], slopes: Mapping[str, float] | None = None
+               ) -> dict[str, tuple[float, int, int]]:
     """
     Fit the coefficients of the confidence.
 
@@ -133,6 +134,9 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
     ----------
     lines : sequence of mapping
         Outcomes with the features of their confidence.
+    slopes : mapping of str to float, optional
+        Coefficients that keep their values; the others are fitted beside them. Few outcomes tell
+        how often a tool is right, but not what informs about it.
 
     Returns
     -------
@@ -172,20 +176,24 @@ def calibrated(lines: Sequence[Json]) -> dict[str, tuple[float, int, int]]:
     for verdict, names in COEFFICIENTS.items():
         x = np.array(rows[verdict]).reshape(-1, len(names))
         y = np.array(right[verdict])
-        for name, value in zip(names, _fit(x, y), strict=True):
+        kept = [None if slopes is None else slopes.get(name) for name in names]
+        for name, value in zip(names, _fit(x, y, kept), strict=True):
             found[name] = (value, y.size, int(np.sum(y)))
     return found
 
 
-def _fit(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Return the most probable coefficients."""
+def _fit(x: FloatArray, y: FloatArray, kept: Sequence[float | None]) -> FloatArray:
+    """Return the most probable coefficients; those that are kept are given."""
     centre = np.zeros(x.shape[1])
     share = _number('right')
     centre[0] = math.log(share / (1.0 - share))
+    free = np.array([value is None for value in kept])
+    found = np.array([c if value is None else value
+                      for c, value in zip(centre, kept, strict=True)])
 
     def cost(c: FloatArray) -> float:
-        z = x @ c
+        z = x[:, free] @ c + x[:, ~free] @ found[~free]
         return float(np.sum(np.logaddexp(0.0, z) - y * z)
-                     + 0.5 * np.sum(((c - centre) / _number('spread')) ** 2))
-    found: FloatArray = minimize(cost, centre, method='BFGS').x
+                     + 0.5 * np.sum(((c - centre[free]) / _number('spread')) ** 2))
+    found[free] = minimize(cost, centre[free], method='BFGS').x
     return found

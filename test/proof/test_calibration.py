@@ -53,6 +53,17 @@ def test_a_gain_that_informs_gets_weight_and_the_share_right_is_kept() -> None:
     assert found['unknown_constant'][1] == 0
 
 
+def test_slopes_that_are_kept_leave_the_constant_to_fit() -> None:
+    """Fewer outcomes that are right lower the constant alone, to the share that is right."""
+    slopes = {'name_share': -0.4, 'name_gain': 0.8}
+    found = calibrated(lines(400), slopes)
+    assert {name: found[name][0] for name in slopes} == slopes
+    constant = found['name_constant'][0]
+    stated = [1.0 / (1.0 + np.exp(-(constant - 0.4 * np.log(0.1)
+                                    + 0.8 * np.log10(r['features']['gain'])))) for r in lines(400)]
+    assert np.mean(stated) == pytest.approx(found['name_constant'][2] / 400, abs=0.02)
+
+
 def test_a_share_that_informs_gets_weight() -> None:
     """Outcomes that are wrong the oftener the more a smooth effort explains."""
     rng = np.random.default_rng(5)
