@@ -234,6 +234,9 @@ def test_other_logs_show_the_same(how: Mapping[str, float], effect: str) -> None
     """Wheel rates at 20 Hz through a low-pass, and no accelerometer."""
     case = changed({}, 7, rate=20.0, low_pass=0.08, accelerometer=0.0, **how)
     assert [one.effect for one in case.diagnosis.findings] == [effect]
+    if 'factor' in how:
+        (number,) = case.diagnosis.findings[0].parameters
+        assert number.value == pytest.approx(how['factor'], abs=0.05)
     # A delay of all streams would be one of the commands.
     for z in (case.loop.before, case.loop.after):
         assert abs(dict(zip(case.loop.base.names, z, strict=True))['pose_late']) < 0.003
