@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from lg_husky_sim.jit import jit
 from lg_husky_sim.signals import FloatArray
+import numpy as np
+from numpy.typing import NDArray
 
 
 @jit
@@ -60,3 +62,25 @@ def accepted(times: FloatArray, values: FloatArray, late: float, most: float, sl
                 target = min(max(values[k], -most), most)
                 k += 1
         out[s] = total / step
+
+
+@jit
+def spread(taken: FloatArray, which: NDArray[np.intp], column: int, out: FloatArray) -> None:
+    """
+    Give each robot the command that it takes.
+
+    Parameters
+    ----------
+    taken : numpy.ndarray, shape (n_rows, n_steps)
+        What is taken, each once.
+    which : numpy.ndarray of int, shape (n_lanes,)
+        Row of each robot.
+    column : int
+        Of the output.
+    out : numpy.ndarray, shape (n_steps, 2, n_lanes)
+        Its column is filled.
+
+    """
+    for k in range(out.shape[0]):
+        for j in range(out.shape[2]):
+            out[k, column, j] = taken[which[j], k]

@@ -10,7 +10,7 @@ import threading
 from lg_husky_sim.diagnosis.before_after.base import Base
 from lg_husky_sim.diagnosis.before_after.base_names import FIXED, OUTPUTS, ROBOT
 from lg_husky_sim.diagnosis.before_after.base_robot import simulate
-from lg_husky_sim.diagnosis.before_after.commands import accepted
+from lg_husky_sim.diagnosis.before_after.commands import accepted, spread
 from lg_husky_sim.diagnosis.before_after.drives import Drive
 from lg_husky_sim.signals import FloatArray, TimeSeries
 import numpy as np
@@ -59,13 +59,11 @@ def _accepted(base: Base, drive: Drive, robots: FloatArray, begin: FloatArray,
             ('forward', 'speed_gain', ahead), ('yaw', 'turn_width', turning))):
         how = robots[:, [at('dead_time'), at(f'limit_{axis}'), at(f'slew_{axis}'), at(gain)]]
         rows, which = distinct(np.column_stack([how, sent]))
-        taken = np.empty((drive.steps, len(rows)))
-        one = np.empty(drive.steps)
+        taken = np.empty((len(rows), drive.steps))
         for k, (late, most, slew, gain_here, number) in enumerate(rows):
             accepted(commands[int(number)].times, values[int(number)][column], late, most, slew,
-                     now / gain_here, drive.start, base.settings.simulation['step'], one)
-            taken[:, k] = one
-        found[:, column] = taken[:, which]
+                     now / gain_here, drive.start, base.settings.simulation['step'], taken[k])
+        spread(taken, which, column, found)
     return found
 
 

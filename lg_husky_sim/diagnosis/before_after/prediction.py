@@ -226,11 +226,11 @@ def jacobian(base: Base, drive: Drive, z: FloatArray, free: NDArray[np.bool_]
     should: dict[str, FloatArray] = {}
 
     def fill(ks: Sequence[int], others: Mapping[str, FloatArray]) -> None:
-        fine = [i for i in range(len(ks)) if all(
-            np.all(np.abs(rows[..., i]) < diverged) for rows in others.values())]
+        fine = np.all([np.all(np.abs(rows) < diverged, axis=(0, 1)) for rows in others.values()],
+                      axis=0)
+        own = np.array(ks)[fine]
         for name, rows in others.items():
-            for i in fine:
-                columns[name][:, :, ks[i]] = (should[name] - rows[..., i]) / deltas[ks[i]]
+            columns[name][:, :, own] = (should[name][..., None] - rows[..., fine]) / deltas[own]
     done = 0
     for motion, others in _several(base, drive, [x, *(near[k] for k in moves)]):
         if not should:
