@@ -20,12 +20,12 @@ from lg_husky_sim.diagnosis.before_after.fitting import fit_set, Prior, raced
 from lg_husky_sim.diagnosis.before_after.prediction import residual
 from lg_husky_sim.diagnosis.before_after.runnable import fitted, started
 from lg_husky_sim.diagnosis.before_after.settings import settings
+from lg_husky_sim.diagnosis.before_after.starts import starts_from
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise, noise_of
 from lg_husky_sim.diagnosis.settings import setting
 from lg_husky_sim.husky.model_file import ModelFile
 from lg_husky_sim.recording import Recording
 from lg_husky_sim.recording.recording import Segment
-from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 
@@ -105,7 +105,8 @@ def commercial_base(recordings: Sequence[Recording], parts: Sequence[Segment],
     prior = Prior(base.start, base.sd, np.ones(start.size, dtype=np.bool_))
     noise = first_noise(known)
     steps, rough = int(known.fit['steps']), known.fit['roughly']
-    z = raced(base, drives, prior, noise, [[one] for one in _options(base)], rough, pool.map).z
+    z = raced(base, drives, prior, noise, starts_from(base, prior.free, base.start), rough,
+              pool.map).z
     noise = noise_of([residual(base, d, z) for d in drives],
                      [d.vigour for d in drives], known, base.given)
     z = fit_set(base, drives, prior, noise, z, steps, rough, pool.map).z
@@ -139,14 +140,3 @@ def _shortened(parts: Sequence[Segment]) -> list[Segment]:
             name: series.slice(part.start, end) for name, series in part.streams.items()}))
         left -= end - part.start
     return kept
-
-
-def _options(base: Base) -> list[FloatArray]:
-    # Where a fit may begin: the middle of the priors, and what may differ from there.
-    options = [base.start]
-    for entry in base.settings.starts:
-        option = np.array(base.start)
-        for name, value in entry.items():
-            option[base.names.index(name)] += value
-        options.append(option)
-    return options

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import chain
 
 from lg_husky_sim.diagnosis.before_after.settings import settings
 from lg_husky_sim.diagnosis.diagnose import Case, diagnose
@@ -58,7 +59,7 @@ def test_the_base_of_a_comparison_is_in_proportion() -> None:
         assert (here.lower, here.upper) == (factor * there.lower, factor * there.upper)
         assert here.change == (1.0 if there.logarithmic else factor) * there.change
     names = {q.name: q for q in usual.quantities}
-    for one, other in zip(large.starts, usual.starts, strict=True):
+    for one, other in zip(chain(*large.starts), chain(*usual.starts), strict=True):
         for name, value in other.items():
             assert one[name] == value * (1.0 if names[name].logarithmic
                                          else LARGE.factor(names[name].unit))

@@ -173,7 +173,7 @@ def raced(base: Base, drives: Sequence[Drive], about: Prior, noise: Noise,
           kinds: Sequence[Sequence[FloatArray]], until: float, each: Mapper,
           most: str = 'raced') -> SetFit:
     """
-    Fit from the likeliest start of each kind, of the best few of which one goes on, by halving.
+    Fit from the likeliest start of each kind; of those, the best part goes on, and so on.
 
     Of starts that are as likely as another, as a limit that is not reached is, that one is enough.
 
@@ -218,5 +218,5 @@ def raced(base: Base, drives: Sequence[Drive], about: Prior, noise: Noise,
     while len(alive) > 1:
         fits = sorted((fit(one, int(numbers['race_steps'])) for one in alive),
                       key=lambda one: one.cost)
-        alive = [one.z for one in fits[:len(fits) // 2]]
+        alive = [one.z for one in fits[:max(1, len(fits) // int(numbers['race_part']))]]
     return fit(alive[0], int(numbers['steps']))

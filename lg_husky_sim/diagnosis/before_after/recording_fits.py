@@ -27,15 +27,14 @@ from lg_husky_sim.diagnosis.before_after.prediction import (
     measured,
     residual,
 )
+from lg_husky_sim.diagnosis.before_after.robot_kinds import kinds_of, of_likeliest_kind, Places
+from lg_husky_sim.diagnosis.before_after.starts import starts_from
 from lg_husky_sim.diagnosis.before_after.whitening import first_noise, Noise, noise_of
 from lg_husky_sim.signals import FloatArray
 import numpy as np
-from numpy.typing import NDArray
 
 #: Told how far it is (0 to 1).
 Share = Callable[[float], None]
-#: Parameters by recording, on the scale of the estimates.
-Places = Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +109,11 @@ def fit_recordings(base: Base, drives: Sequence[Drive], lags: Places, begin: Flo
     Fit the base to each recording.
 
     The longest is fitted first, from every kind of robot; the others begin there, or where any
-    start is likelier. Then all are fitted twice more, with a prior about their mean that is as
-    wide as a change, and once with one as wide as the recordings show themselves to differ,
-    whichever set they are of. Each may begin where any other ended, or at a start from there.
-    Where a fit begins, and what its delays are expected to be, differs by as much as its streams
-    say.
+    start is likelier, and all together tell the kind. Then all are fitted twice more, with a prior
+    about their mean that is as wide as a change, and once with one as wide as the recordings show
+    themselves to differ, whichever set they are of. Each may begin where any other ended, or at a
+    start from there. Where a fit begins, and what its delays are expected to be, differs by as
+    much as its streams say.
 
     Parameters
     ----------
@@ -182,7 +181,7 @@ def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequ
         base, [drive for drives in groups.values() for drive in drives]))
     names = list(groups)
     longest = max(names, key=lambda name: sum(d.steps for d in groups[name]))
-    kinds = _kinds(base, prior, begin)
+    kinds = kinds_of(base, prior, begin)
     firsts = list(pool.map(lambda kind: fit_set(
         base, groups[longest], replace(kind[1], mean=kind[1].mean + lags[longest]), noise,
         kind[0] + lags[longest], steps, roughly, map), kinds))
@@ -194,12 +193,15 @@ def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequ
                most: str = 'raced') -> SetFit:
         return raced(base, groups[name], replace(about, mean=about.mean + lags[name]), noise,
                      kinds, until, map, most)
-    options = [*(start for start, _ in kinds),
-               *_shifted(base, prior.free, first - lags[longest])]
-    places = dict(zip(names, pool.map(lambda name: first if name == longest else fitted(
-        name, prior, [[one + lags[name]] for one in options], roughly).z, names), strict=True))
+    options = [*([start] for start, _ in kinds),
+               *starts_from(base, prior.free, first - lags[longest])]
+    places: Places = dict(zip(names, pool.map(lambda name: first if name == longest else fitted(
+        name, prior, [[one + lags[name] for one in kind] for kind in options], roughly).z,
+        names), strict=True))
     share(0.4)
     noise = _renewed(base, groups, places, replace(prior, sd=wide), noise, pool)
+    places, prior = of_likeliest_kind(base, groups, noise, places, lags, prior,
+                                      [kind for _, kind in kinds], pool)
     for turn, until in enumerate((roughly, enough)):
         mean = middle(base, prior, wide, {
             name: place - lags[name] for name, place in places.items()},
@@ -211,8 +213,9 @@ def _alone(base: Base, prior: Prior, wide: FloatArray, groups: Mapping[str, Sequ
                   until: float = until, turn: int = turn) -> FloatArray:
             # Of starts of a kind that begin at different ends, the likeliest.
             begins = [end + lags[name] for other, end in ends.items() if other != name or not turn]
-            others = [[one] for one in begins] if turn else list(zip(
-                *(_shifted(base, prior.free, one) for one in begins), strict=True))
+            others = [[one] for one in begins] if turn else [
+                [one for kind in alike for one in kind] for alike in zip(
+                    *(starts_from(base, prior.free, one) for one in begins), strict=True)]
             fits = [fitted(name, about, [[places[name]]], until),
                     fitted(name, about, others, until, 'raced' if turn else 'raced_first')]
             return min(fits, key=lambda fit: fit.cost).z
@@ -261,35 +264,6 @@ def _moving(base: Base, drives: Sequence[Drive]) -> set[str]:
     return {name for drive in drives for stream, rows in measured(base, drive).items()
             for name, column in zip(CHANNELS[stream], rows.T, strict=True)
             if column.size and np.ptp(column) > 0.0}
-
-
-def _kinds(base: Base, prior: Prior, begin: FloatArray) -> list[tuple[FloatArray, Prior]]:
-    # Where the kinds of robot are the same for this block, once. Whether there is a loop is no
-    # matter of degree: its gains are expected about those of the kind.
-    names, found = base.names, [(begin, prior)]
-    for kind in base.kinds:
-        start, mean = np.array(begin), np.array(prior.mean)
-        for name, value in kind.items():
-            k = names.index(name)
-            if prior.free[k]:
-                start[k] = base.place(name, value)
-                if name in base.settings.of_a_kind:
-                    mean[k] = start[k]
-        if not any(np.array_equal(start, one) for one, _ in found):
-            found.append((start, replace(prior, mean=mean)))
-    return found
-
-
-def _shifted(base: Base, free: NDArray[np.bool_], begin: FloatArray) -> list[FloatArray]:
-    names, (lower, upper) = base.names, base.bounds()
-    found = [begin]
-    for entry in base.settings.starts:
-        if all(free[names.index(name)] for name in entry):
-            one = np.array(begin)
-            for name, value in entry.items():
-                one[names.index(name)] += value
-            found.append(np.clip(one, lower, upper))
-    return found
 
 
 def _renewed(base: Base, groups: Mapping[str, Sequence[Drive]], places: Places, prior: Prior,

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import chain
 from typing import Any
 
 from lg_husky_sim.diagnosis.before_after.base_names import ROBOT
@@ -134,7 +135,7 @@ class Settings:
     body: frozenset[str]
     limits: frozenset[str]
     of_a_kind: frozenset[str]
-    starts: tuple[Mapping[str, float], ...]
+    starts: tuple[tuple[Mapping[str, float], ...], ...]
     kinds: tuple[Mapping[str, float], ...]
     fit: Mapping[str, float]
     decision: Mapping[str, float]
@@ -161,7 +162,7 @@ class Settings:
         return replace(
             self, robot=tuple(q.of(robot) for q in self.robot),
             record=tuple(q.of(robot) for q in self.record),
-            starts=tuple(values(entry, True) for entry in self.starts),
+            starts=tuple(tuple(values(entry, True) for entry in kind) for kind in self.starts),
             kinds=tuple(values(entry, False) for entry in self.kinds),
             fit={**self.fit, 'current_shows': robot.factor('A') * self.fit['current_shows']})
 
@@ -170,6 +171,12 @@ def _number(where: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise DiagnosisError(f'before_after.yaml: {where} = {shown(value)} is not a number')
     return float(value)
+
+
+def _entries(section: str, found: Sequence[Mapping[str, object]]
+             ) -> tuple[Mapping[str, float], ...]:
+    return tuple({name: _number(f'{section}.{name}', value) for name, value in entry.items()}
+                 for entry in found)
 
 
 def _quantity(name: str, entry: Mapping[str, Any]) -> Quantity:
@@ -231,11 +238,10 @@ def settings() -> Settings:
         noise = {name: _number(f'{name}.noise', entry['noise']) for name, entry in channels}
         known = frozenset((*robot, *(q.name for q in record)))
         groups = {key: frozenset(content[key]) for key in ('body', 'limits', 'of_a_kind')}
-        starts, kinds = (tuple({name: _number(f'{section}.{name}', value)
-                                for name, value in entry.items()} for entry in content[section])
-                         for section in ('starts', 'kinds'))
+        kinds = _entries('kinds', content['kinds'])
+        starts = tuple(_entries('starts', kind) for kind in content['starts'])
         for name in sorted({*(name for group in groups.values() for name in group),
-                            *(name for entry in (*starts, *kinds) for name in entry)} - known):
+                            *chain(*chain(*starts), *kinds)} - known):
             raise DiagnosisError(f'{path}: unknown parameter {shown(name)}')
         return Settings(tuple(robot[name] for name in ROBOT), record,
                         _values(content, 'simulation'), bins, noise, groups['body'],
