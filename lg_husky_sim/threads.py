@@ -11,6 +11,7 @@ import threading
 from typing import Any, TypeVar
 
 from lg_husky_sim.blas import one_thread
+from lg_husky_sim.heap import kept_memory
 
 Outcome = TypeVar('Outcome')
 
@@ -50,6 +51,6 @@ class Threads(ThreadPoolExecutor):
 
 @contextmanager
 def threads(jobs: int) -> Iterator[Threads]:
-    """Give threads, with one thread in each for linear algebra."""
-    with one_thread(), Threads(jobs) as pool:
+    """Give threads that keep the memory they free, with one in each for linear algebra."""
+    with one_thread(), kept_memory(), Threads(jobs) as pool:
         yield pool

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / 'lg_husky_sim'
 MAX_LINES = 400
 
-BASE = {'allocator', 'blas', 'errors', 'extras', 'folders', 'jit', 'manoeuvres', 'parallel',
+BASE = {'blas', 'errors', 'extras', 'folders', 'heap', 'jit', 'manoeuvres', 'parallel',
         'resources', 'settings', 'signals', 'threads', 'yaml_files'}
 MODEL = {'linear_graph', 'husky', 'simulation'}
 DATA = MODEL | {'recording', 'comparison', 'reporting'}
@@ -26,9 +26,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     'folders': {'errors'},
     'yaml_files': {'errors'},
     'settings': {'errors', 'resources', 'yaml_files'},
-    'allocator': set(),
     'blas': set(),
-    'threads': {'blas'},
+    'heap': set(),
+    'threads': {'blas', 'heap'},
     'jit': {'errors', 'extras'},
     'parallel': {'errors', 'extras'},
     'manoeuvres': {'errors', 'signals', 'resources', 'yaml_files'},

@@ -53,7 +53,6 @@ def command(
     residual is compared with every effect of the catalogue; one is adopted only if it explains
     more than chance does at the nominal false-alarm rate. A folder stands for all bags in it.
     """
-    from lg_husky_sim.allocator import give_back_large_blocks
     from lg_husky_sim.api.robots import Husky
     from lg_husky_sim.folders import check_folder
     from lg_husky_sim.reporting.provenance import given_command
@@ -64,7 +63,6 @@ def command(
     if with_report:
         check_extras()
     husky = Husky(robot, **settings)
-    give_back_large_blocks()
     with say.stages() as report:
         found = husky.diagnose(
             recordings, baseline=baselines, jobs=jobs,

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-import itertools
 import math
 
 from lg_husky_sim.diagnosis.evidence.evidence import Evidence, Fit, promised_by
@@ -80,7 +79,7 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
         with suppress(ParameterError):
             begins.append(_begun_at(evidence, nominal_of(fit.point)))
     raced = [_raced(evidence, *begin, options, rounds, least) for begin in begins]
-    best = min(itertools.chain(*raced), key=lambda one: one.cost, default=None)
+    best = min((one for one in raced if one is not None), key=lambda one: one.cost, default=None)
     if best is None:
         return fit
     ended = fit.promised < setting('fit_converged')
@@ -101,10 +100,10 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
 
 
 def _raced(evidence: Evidence, begin: Fit, inflation: float, options: Sequence[Reading],
-           rounds: int, least: float) -> list[Fit]:
+           rounds: int, least: float) -> Fit | None:
     # The readings that promise most, and enough, begin; of those that are ahead after a few steps
-    # the ones go on that may still catch up with the first. Where that was under noise that is
-    # larger than it is, the likeliest goes on under the noise as it is.
+    # the ones go on that may still catch up with the first. The likeliest counts; where that was
+    # under noise that is larger than it is, it goes on under the noise as it is.
     points = [_read_so(evidence, begin.point, one) for one in options]
 
     def promise(point: Point) -> float:
@@ -115,18 +114,24 @@ def _raced(evidence: Evidence, begin: Fit, inflation: float, options: Sequence[R
     order = enough[np.argsort(promised[enough], kind='stable')][:int(setting('readings_fitted'))]
     first, last = int(setting('reading_start')), int(setting('readings_finished'))
 
-    def begun(place: int) -> Fit:
-        return evidence.fit(points[place], begin.slopes, rounds=first, inflation=inflation)
+    def slim(fit: Fit) -> Fit:
+        # Of many fits, the whitened derivatives are not kept.
+        return replace(fit, jacobian=np.zeros((0, 0)))
+
+    def begun(place: int) -> tuple[Fit, float]:
+        fit = evidence.fit(points[place], begin.slopes, rounds=first, inflation=inflation)
+        return slim(fit), fit.cost - fit.promised
 
     def finished(one: Fit) -> Fit:
-        return evidence.fit(one.point, one.slopes, rounds=rounds - first, inflation=inflation)
-    ahead = sorted(evidence.pool.map(begun, order.tolist()), key=lambda one: one.cost)[:last]
+        return slim(evidence.fit(one.point, one.slopes, rounds=rounds - first,
+                                 inflation=inflation))
+    ahead = sorted(evidence.pool.map(begun, order.tolist()), key=lambda one: one[0].cost)[:last]
     ends = list(evidence.pool.map(finished, [
-        one for one in ahead if one.cost - one.promised <= ahead[0].cost]))
+        one for one, hoped in ahead if hoped <= ahead[0][0].cost]))
     if inflation == 1.0 or not ends:
-        return ends
+        return min(ends, key=lambda one: one.cost, default=None)
     best = min(ends, key=lambda one: evidence.cost(evidence.residuals(one.predicted), one.point))
-    return [evidence.fit(best.point, rounds=rounds)]
+    return evidence.fit(best.point, rounds=rounds)
 
 
 def _begun_at(evidence: Evidence, start: Point) -> tuple[Fit, float]:

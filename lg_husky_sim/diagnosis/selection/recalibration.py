@@ -62,7 +62,8 @@ def as_logged(evidence: Evidence, base: Fit, afresh: bool = False) -> Logged:
     if chosen is base:
         return Logged(base)
     pool = [h for h in hypotheses(base.point.structure) if not h.effect.kind.needs_onset]
-    early = fitted(evidence, base, promising(evidence, base, pool), [base.point], whole=False)
+    early = fitted(evidence, base, promising(evidence, base, pool), [base.point], whole=False,
+                   leading_on=True)
     better = [t for t in early if t.gain > promised(base, chosen)]
     return Logged(base if better else chosen, better, early)
 

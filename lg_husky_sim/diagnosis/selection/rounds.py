@@ -124,7 +124,8 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
     begins : sequence of (Point, mapping)
         Points of the base, with numbers of the effect.
     whole : bool
-        Whether to take the derivatives by the base's numbers anew in the end.
+        Whether to take the derivatives by the base's numbers anew in the end. The fit has all its
+        derivatives only where they were, or where this is not asked for.
 
     Returns
     -------
@@ -150,7 +151,7 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
             starts[b'narrowed' + key] = 0.0, hypothesis.point(point, likeliest)
     size = len(base.point.unknowns)
     few = int(setting('whole_rounds'))
-    found = []
+    found: list[Tried] = []
     for _, start in starts.values():
         own = range(size, len(start.unknowns))
         slopes = [np.hstack([one, np.zeros((one.shape[0], len(own)))]) for one in base.slopes]
@@ -159,12 +160,17 @@ def attempt(evidence: Evidence, base: Fit, hypothesis: Hypothesis, begins: Seque
             best = evidence.fit(start, slopes, rounds=few, renew=own)
             if best.cost < base.cost + setting('lost'):
                 best = evidence.fit(best.point, best.slopes, renew=own)
-            found.append(best)
-    for best in sorted(found, key=lambda one: one.cost):
+            found.append(Tried(hypothesis, best, base.cost - best.cost, evidence.count))
+            # Derivatives of the best alone may be asked for.
+            found.sort(key=lambda one: one.fit.cost)
+            kept = found[:0 if whole else 1]
+            found = [*kept, *(one.light for one in found[len(kept):])]
+    for one in found:
         with suppress(LgHuskyError):
-            if whole and best.cost < base.cost + setting('lost'):
-                best = evidence.fit(best.point, rounds=few)
-            return Tried(hypothesis, best, base.cost - best.cost, evidence.count)
+            if whole and one.fit.cost < base.cost + setting('lost'):
+                best = evidence.fit(one.fit.point, rounds=few)
+                return replace(one, fit=best, gain=base.cost - best.cost)
+            return one
     return None
 
 
@@ -282,7 +288,8 @@ def _looks(evidence: Evidence, base: Fit, pool: Sequence[Hypothesis],
 
 
 def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequence[Point],
-           further: Sequence[Look] = (), *, whole: bool = True) -> list[Tried]:
+           further: Sequence[Look] = (), *, whole: bool = True, leading_on: bool = False
+           ) -> list[Tried]:
     """
     Fit hypotheses from where looks and points say, order by score.
 
@@ -301,7 +308,9 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
     further : sequence of Look
         Whose numbers are beginnings, too.
     whole : bool
-        Whether to finish the fits of the best ones; other fits may go on from where they end.
+        Whether to finish the fits of the best ones.
+    leading_on : bool
+        Whether other fits go on from where they end, which takes all derivatives.
 
     Returns
     -------
@@ -320,7 +329,7 @@ def fitted(evidence: Evidence, base: Fit, looks: Sequence[Look], points: Sequenc
             numbers += one.hypothesis.starts
         made = attempt(evidence, base, one.hypothesis, list(itertools.product(points, numbers)),
                        whole=False)
-        return made.light if made is not None and whole else made
+        return made if made is None or leading_on else made.light
     results = evidence.pool.map(tried, [one for one in looks if one.gain >= least])
     rough = [one for one in results if one is not None]
     rough.sort(key=lambda t: -t.score)

@@ -279,6 +279,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             known, rivals = other, []
     evidence, base, initial = known.evidence, known.base, start
     seeds = seeds_of(known.first, known.rough, base, known.logged)
+    # What was fitted on the way there is not needed any more, and large.
+    known = replace(known, rough=base, logged=Logged(base))
     otherwise = None
     if seeds and seeds[0].fit.point.reading != base.point.reading:
         # Counted against the base with its own reading.
