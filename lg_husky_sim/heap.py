@@ -3,8 +3,8 @@
 """
 Keep memory that is freed for a while, where arrays of megabytes come and go all the time.
 
-By default, the C library gives each of them back to the system and gets fresh pages for the next,
-which the system fills with zeros: a sixth of a diagnosis.
+By default, the C library gives large arrays back to the system one by one and gets fresh pages for
+the next, which the system fills with zeros: two million pages in a diagnosis of three drives.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ import platform
 
 #: Parameters of `mallopt` in glibc's malloc.h.
 TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD, ARENA_MAX = -1, -2, -3, -8
-#: The largest array that glibc may keep [bytes].
-LARGEST = 32 * 2**20
-#: What glibc chooses by itself once arrays of that size come and go [bytes].
-USUAL_TRIM, USUAL_PAD = 2 * LARGEST, 128 * 2**10
+#: Arrays from this size on still go back [bytes]: derivatives of long recordings, of which few are
+#: made, and which leave holes that are of no use.
+LARGE = 4 * 2**20
+#: What glibc begins with [bytes].
+USUAL_TRIM, USUAL_PAD = 128 * 2**10, 128 * 2**10
 
 
 @contextmanager
@@ -30,8 +31,8 @@ def kept_memory() -> Iterator[None]:
         yield
         return
     # Threads share one heap: each would keep what is freed in its own.
-    for name, value in ((MMAP_THRESHOLD, LARGEST), (TRIM_THRESHOLD, 2**31 - 1),
-                        (TOP_PAD, LARGEST), (ARENA_MAX, 1)):
+    for name, value in ((MMAP_THRESHOLD, LARGE), (TRIM_THRESHOLD, 2**31 - 1),
+                        (TOP_PAD, LARGE), (ARENA_MAX, 1)):
         library.mallopt(name, value)
     try:
         yield

@@ -133,14 +133,16 @@ def missing_efforts(evidence: Evidence, fit: Fit) -> tuple[Missing, ...]:
 
     def at(balance: str) -> list[Missing]:
         columns = _hat_responses(evidence, BALANCES[balance][0], counts)
-        gain, _, values, deviations = beyond_chance(evidence, fit, projection, columns)
         if BALANCES[balance][2] == 'none':
-            normal, slope = projection.problem(columns[:, steady])
+            normal, slope = projection.problem(columns)
             bursts = burst_evidence(levelled(
-                slope / np.sqrt(np.maximum(np.diag(normal), 1e-12)), speeds))
+                (slope / np.sqrt(np.maximum(np.diag(normal), 1e-12)))[steady], speeds))
         else:
             # Their efforts burst with every command that comes a little late.
             bursts = wheel_bursts(evidence, fit, BALANCES[balance][2])
+        # There are many of them in a long recording.
+        gain, _, values, deviations = beyond_chance(evidence, fit, projection, columns,
+                                                    overwrite=True)
         ends = np.cumsum(counts)[:-1]
         return [Missing(balance, drive, np.linspace(drive.start, drive.end, size), own, deviation,
                         gain, bursts)

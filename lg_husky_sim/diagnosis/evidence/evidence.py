@@ -71,6 +71,11 @@ class Fit:
     predicted: tuple[FloatArray, ...]
 
     @property
+    def bare(self) -> Fit:
+        """Return the same without derivatives, which are as large as all the rest."""
+        return replace(self, slopes=(), jacobian=np.zeros((0, 0)))
+
+    @property
     def descent(self) -> FloatArray:
         """Where the cost falls: less its gradient by the places, shape (k,)."""
         return descent_of(self.jacobian, self.whitened, self.point)

@@ -228,8 +228,8 @@ def log_evidence(normal: FloatArray, slope: FloatArray) -> tuple[float, FloatArr
     return best, vectors @ (turned * spread), np.sqrt((vectors ** 2) @ spread)
 
 
-def beyond_chance(evidence: Evidence, fit: Fit, projection: Projection, columns: FloatArray
-                  ) -> tuple[float, float, FloatArray, FloatArray]:
+def beyond_chance(evidence: Evidence, fit: Fit, projection: Projection, columns: FloatArray,
+                  *, overwrite: bool = False) -> tuple[float, float, FloatArray, FloatArray]:
     """
     Return the log evidence of columns where innovations are not quite white.
 
@@ -243,6 +243,8 @@ def beyond_chance(evidence: Evidence, fit: Fit, projection: Projection, columns:
         Of the fit.
     columns : numpy.ndarray, shape (n, k)
         Whitened responses.
+    overwrite : bool
+        Whether they are not needed any more.
 
     Returns
     -------
@@ -258,7 +260,7 @@ def beyond_chance(evidence: Evidence, fit: Fit, projection: Projection, columns:
     explained, values, deviations = log_evidence(normal, slope)
     if explained <= 0.0:
         return 0.0, 0.0, values, deviations
-    left = projection.apart(columns)
+    left = projection.apart(columns, overwrite=overwrite)
     spread = dispersion(evidence, fit.whitened - left @ values, left)
     gain, values, deviations = log_evidence(normal / spread, slope / spread)
     return gain, explained, values, deviations

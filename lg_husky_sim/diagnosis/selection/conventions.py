@@ -101,9 +101,17 @@ def _better(evidence: Evidence, fit: Fit, options_of: Callable[[
 
 def _raced(evidence: Evidence, begin: Fit, inflation: float, options: Sequence[Reading],
            rounds: int, least: float) -> Fit | None:
+    best = _first_of(evidence, begin, inflation, options, rounds, least)
+    if inflation == 1.0 or best is None:
+        return best
+    # Where it won under noise that is larger than it is, it goes on under the noise as it is.
+    return evidence.fit(best.point, rounds=rounds)
+
+
+def _first_of(evidence: Evidence, begin: Fit, inflation: float, options: Sequence[Reading],
+              rounds: int, least: float) -> Fit | None:
     # The readings that promise most, and enough, begin; of those that are ahead after a few steps
-    # the ones go on that may still catch up with the first. The likeliest counts; where that was
-    # under noise that is larger than it is, it goes on under the noise as it is.
+    # the ones go on that may still catch up with the first. The likeliest is returned.
     points = [_read_so(evidence, begin.point, one) for one in options]
 
     def promise(point: Point) -> float:
@@ -128,10 +136,9 @@ def _raced(evidence: Evidence, begin: Fit, inflation: float, options: Sequence[R
     ahead = sorted(evidence.pool.map(begun, order.tolist()), key=lambda one: one[0].cost)[:last]
     ends = list(evidence.pool.map(finished, [
         one for one, hoped in ahead if hoped <= ahead[0][0].cost]))
-    if inflation == 1.0 or not ends:
-        return min(ends, key=lambda one: one.cost, default=None)
-    best = min(ends, key=lambda one: evidence.cost(evidence.residuals(one.predicted), one.point))
-    return evidence.fit(best.point, rounds=rounds)
+    # Under the noise as it is.
+    return min(ends, default=None, key=lambda one: one.cost if inflation == 1.0 else evidence.cost(
+        evidence.residuals(one.predicted), one.point))
 
 
 def _begun_at(evidence: Evidence, start: Point) -> tuple[Fit, float]:

@@ -111,9 +111,9 @@ class Projection:
         return (normal_matrix(columns, self._weights) - explained.T @ explained,
                 self._target @ columns)
 
-    def apart(self, columns: FloatArray) -> FloatArray:
-        """Return what is left of the columns themselves, shape (n, m)."""
-        explained, found = self._base @ columns, np.array(columns)
+    def apart(self, columns: FloatArray, *, overwrite: bool = False) -> FloatArray:
+        """Return what is left of the columns themselves, shape (n, m); in their place if asked."""
+        explained, found = self._base @ columns, columns if overwrite else np.array(columns)
         for some in row_slices(len(columns)):
             found[some] -= (self._base.T[some] / self._weights[some, None]) @ explained
         return found

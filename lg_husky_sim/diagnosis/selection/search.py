@@ -220,16 +220,20 @@ def _settled(evidence: Evidence, point: Point, first: Evidence) -> tuple[Evidenc
     # The likeliest numbers and noise of an adopted structure: where they began far from the robot
     # as it should be, since the base had absorbed the effect, from there, too, and from there
     # with a log that was made as most are, under a first guess of the noise.
-    found = [calibrated(evidence, point, 1)]
-    if is_distorted(found[0][1]):
-        start = nominal_of(found[0][1].point)
+    best = calibrated(evidence, point, 1)
+    if is_distorted(best[1]):
+        start = nominal_of(best[1].point)
         # With an effect that only other numbers can bear it runs away there.
         with suppress(LgHuskyError):
-            found.append(calibrated(evidence.about(start), start))
+            best = _likelier(best, calibrated(evidence.about(start), start))
             start = as_usual(start)
             own, fit = calibrated(first.about(start), start)
-            found.append(_read_as(own, fit, best_reading(own, fit)))
-    return min(found, key=lambda one: one[0].surprise(one[1]))
+            best = _likelier(best, _read_as(own, fit, best_reading(own, fit)))
+    return best
+
+
+def _likelier(one: tuple[Evidence, Fit], other: tuple[Evidence, Fit]) -> tuple[Evidence, Fit]:
+    return min(one, other, key=lambda each: each[0].surprise(each[1]))
 
 
 def as_usual(point: Point) -> Point:
@@ -279,8 +283,8 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
             known, rivals = other, []
     evidence, base, initial = known.evidence, known.base, start
     seeds = seeds_of(known.first, known.rough, base, known.logged)
-    # What was fitted on the way there is not needed any more, and large.
-    known = replace(known, rough=base, logged=Logged(base))
+    # Nothing goes on from what was fitted on the way there.
+    known = replace(known, rough=base.bare, base=base.bare, logged=Logged(base.bare))
     otherwise = None
     if seeds and seeds[0].fit.point.reading != base.point.reading:
         # Counted against the base with its own reading.
@@ -308,37 +312,36 @@ def search(evidence: Evidence, start: Point, progress: Progress) -> Search:
                            Laws(plain.point, found) if found else None, seeds)
         seeds = []
         best = one.tried[0] if one.tried else None
-        evidence = one.evidence
+        evidence, base = one.evidence, one.base
         adopted = best is not None and one.adopted
-        other_base = other_rotors(evidence, one.base)
+        other_base = other_rotors(evidence, base)
         if other_base is not None and (
-                not adopted or best is None or best.score <= one.base.cost - other_base.cost
+                not adopted or best is None or best.score <= base.cost - other_base.cost
                 - 0.5 * math.log(evidence.count)):
             # No effect, but a robot that the nominal numbers leave something out of: look again.
             otherwise, postponed = None, False
             evidence, base = calibrated(evidence, other_base.point, 1)
             evidence, base = _read_as(evidence, base, best_reading(evidence, base, afresh=True))
-            known = replace(known, evidence=evidence, base=base)
+            known = replace(known, evidence=evidence, base=base.bare)
             start = nominal_of(base.point)
             plain = evidence.fit(with_effects(plain.point, base.point, []))
             continue
         if postponed and not found:
-            chosen = best_reading(evidence, one.base)
-            if not adopted or best is None or one.base.cost - chosen.cost >= best.gain:
+            chosen = best_reading(evidence, base)
+            if not adopted or best is None or base.cost - chosen.cost >= best.gain:
                 # The log was made otherwise, or else nothing says so: look again.
                 postponed = False
-                base = one.base
                 if otherwise is not None:
                     evidence, base = otherwise
                     chosen, otherwise = best_reading(evidence, base), None
                 evidence, base = _read_as(evidence, base, chosen)
                 start = nominal_of(base.point)
                 continue
+        one = replace(one, base=base.bare)
         rounds.append(one)
         if number == 0:
-            plain = one.base if otherwise is None else one.evidence.fit(otherwise[1].point)
+            plain = base if otherwise is None else evidence.fit(otherwise[1].point)
         if not adopted or best is None:
-            base = one.base
             break
         found.append(best.hypothesis)
         evidence, base = _settled(evidence, best.fit.point, known.first)

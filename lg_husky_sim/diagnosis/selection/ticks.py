@@ -55,7 +55,7 @@ def likelier_ticks(first: Evidence, plain: tuple[Evidence, Fit], starts: Sequenc
         With commands at ticks of one rate or another.
 
     """
-    afresh = [(evidence, evidence.fit(point)) for evidence, point in (
+    afresh = [(evidence, evidence.fit(point).bare) for evidence, point in (
         ticked(first, start, drives) for drives in rivals for start in starts)]
     best = min(range(len(afresh)), key=lambda k: afresh[k][1].cost)
     near = calibrated(afresh[best][0], afresh[best][1].point, 1)
