@@ -32,7 +32,7 @@ REPORTS = sorted((path.stem for path in DOCS.glob('proof_report_*.jsonl')), reve
 OUTCOMES = ('proof_report', 'proof_exam', 'proof_exam_2', 'proof_exam_3', 'proof_exam_4',
             'proof_exam_5', 'proof_exam_6', 'proof_exam_7', 'proof_exam_8', 'proof_exam_9',
             'proof_exam_10', 'proof_exam_11', 'proof_exam_12', 'proof_exam_13', 'proof_exam_14',
-            'proof_exam_15', 'proof_exam_16', 'proof_exam_17', 'proof_exam_18',
+            'proof_exam_15', 'proof_exam_16', 'proof_exam_17', 'proof_exam_18', 'proof_exam_19',
             *REPORTS,
             'proof_validation')
 
