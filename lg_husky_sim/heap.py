@@ -19,8 +19,8 @@ TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD, ARENA_MAX = -1, -2, -3, -8
 #: Arrays from this size on still go back [bytes]: derivatives of long recordings, of which few are
 #: made, and which leave holes that are of no use.
 LARGE = 4 * 2**20
-#: What glibc begins with [bytes].
-USUAL_TRIM, USUAL_PAD = 128 * 2**10, 128 * 2**10
+#: What glibc comes to by itself where arrays of that size come and go [bytes].
+USUAL_TRIM, USUAL_PAD = 2 * LARGE, 128 * 2**10
 
 
 @contextmanager
