@@ -112,7 +112,8 @@ def test_each_early_effect_is_read_anew(
     pool_of = [h for h in hypotheses(start.structure)
                if h.label in ('speed_loop', 'payload:ground')]
     early = [tried for one in look(first, rough, pool_of)
-             for tried in fitted(first, rough, [one], [rough.point], whole=False)]
+             for tried in fitted(first, rough, [one], [rough.point], whole=False,
+                                 leading_on=True)]
     assert len(early) == 2
     found = read_anew(first, rough, early[::-1])
     assert found is not None
