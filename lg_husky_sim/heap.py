@@ -3,8 +3,8 @@
 """
 Keep memory that is freed for a while, where arrays of megabytes come and go all the time.
 
-By default, the C library gives large arrays back to the system one by one and gets fresh pages for
-the next, which the system fills with zeros: two million pages in a diagnosis of three drives.
+Arrays that go back to the system one by one get fresh pages the next time, which it fills with
+zeros: two million of them in a diagnosis of three drives, with arrays from 1 MB on.
 """
 
 from __future__ import annotations
