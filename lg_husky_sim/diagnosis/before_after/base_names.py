@@ -16,7 +16,7 @@ ROBOT: Final = (
     'mass', 'yaw_inertia', 'com_x', 'com_y', 'com_height', 'radius_left', 'radius_right',
     'slope_x', 'slope_y', 'track', 'deflection', 'rest_leak', 'reference_lag',
     'drag', 'pull', 'scrub', 'scrub_speed', 'dead_voltage', 'bus_resistance', 'droop_rate',
-    'windup', 'stiffness_ratio', 'encoder_left', 'encoder_right')
+    'windup', 'stiffness_ratio', 'encoder_left', 'encoder_right', 'rest_speed', 'creep_shape')
 #: Numbers that are not estimated.
 FIXED: Final = ('wheelbase', 'motor_resistance', 'transmission', 'wheel_radius',
                 'load_time', 'dry_speed', 'rolling_speed', 'gravity', 'rest_rate', 'least_share',

@@ -17,7 +17,7 @@ from lg_husky_sim.signals import FloatArray
 import numpy as np
 
 #: Rows of what the integrator works on.
-ROWS: Final = len(ROBOT) + 71
+ROWS: Final = len(ROBOT) + 72
 # Their places, each with a lane for each robot: parameters, as in `ROBOT`; state; what is worked
 # out within a step, with reciprocals, for divisions take most of its time; and `OUTPUTS`. Two one
 # after the other are left and right, four the tyres: front left, rear left, front right, rear
@@ -26,14 +26,14 @@ ROWS: Final = len(ROBOT) + 71
  _V_MAX, _I_MAX, _INERTIA, _DRY, _, _VISCOUS, _, _MU_ALONG, _MU_ACROSS, _CREEP, _SHARE, _ROLLING,
  _YAW_DAMPING, _MASS, _TURNING, _COM_X, _COM_Y, _HEIGHT, _RADIUS, _, _SLOPE_X, _SLOPE_Y, _TRACK,
  _DEFLECTION, _LEAK, _LAG, _DRAG, _PULL, _SCRUB, _SCRUB_SPEED, _DEAD, _BUS_RESISTANCE, _DROOP,
- _WINDUP, _RATIO, _ENCODER, _,
+ _WINDUP, _RATIO, _ENCODER, _, _REST, _SHAPE,
  _V, _U, _R, _WHEEL, _, _SLOW_V, _SLOW_W, _ACC_X, _ACC_Y, _HELD, _,
  _ALONG, _, _, _, _ACROSS, _, _, _,
  _A00, _A02, _A11, _A12, _A22, _B0, _B1, _B2, _FRONT, _LEFT, _GX, _GY, _BUS,
  _SOFTER, _, _, _, _A, _, _FIXED, _, _VOLTS, _, _WANTED, _, _PER_D, _, _NW, _,
  _FOLLOW, _BUILD, _KEPT, _STIFF_ALONG, _STIFF_ACROSS, _PER_ALONG, _PER_ACROSS, _PER_SIDE,
- _PER_V_MAX, _COSINE, _SINE, _OUT, _, _, _, _, _OUT_ACC, _, _OUT_PLACE, _, _OUT_ANGLES, _, _
- ) = range(ROWS)
+ _PER_V_MAX, _PER_REST, _COSINE, _SINE, _OUT, _, _, _, _, _OUT_ACC, _, _OUT_PLACE, _, _OUT_ANGLES,
+ _, _) = range(ROWS)
 
 
 @jit_part
@@ -58,6 +58,7 @@ def _begin(z: FloatArray, p: FloatArray, start: FloatArray, fixed: FloatArray, s
         z[_PER_ACROSS, j] = z[_STIFF_ACROSS, j] / z[_MU_ACROSS, j]
         z[_PER_SIDE, j] = 2.0 / z[_TRACK, j]
         z[_PER_V_MAX, j] = 1.0 / z[_V_MAX, j]
+        z[_PER_REST, j] = 1.0 / z[_REST, j]
         z[_V, j] = start[0, j] - start[2, j] * z[_COM_Y, j]
         z[_U, j] = start[1, j] + start[2, j] * z[_COM_X, j]
         z[_R, j] = start[2, j]
@@ -149,7 +150,10 @@ def _tyre(z: FloatArray, s: int, f: int, fixed: FloatArray) -> None:
         sx = (z[_V, j] - r * y - rolled) * z[_PER_ALONG, j]
         sy = (z[_U, j] + r * x) * z[_PER_ACROSS, j]
         edge = z[_CREEP, j] + z[_SHARE, j] * abs(rolled)
-        softer = 1.0 / (1.0 + build * (np.sqrt(sx * sx + sy * sy) + edge))
+        slid = np.sqrt(sx * sx + sy * sy)
+        both = slid + edge
+        # It settles at slid / (slid + edge - shape * slid * edge / (slid + edge)) of its most.
+        softer = 1.0 / (1.0 + build * (both - z[_SHAPE, j] * slid * edge / both))
         carried = load * softer
         c = stiff_y * build * carried
         a = stiff_x * build * carried
@@ -191,7 +195,8 @@ def _measured_wheel(z: FloatArray, s: int, wheels: FloatArray, k: int) -> None:
 
 
 @jit_part
-def _driven_wheel(z: FloatArray, s: int, step: float, fixed: FloatArray) -> None:
+def _driven_wheel(z: FloatArray, s: int, step: float, fixed: FloatArray, wheels: FloatArray,
+                  k: int) -> None:
     emf, dry_speed, rest_rate = fixed[2], fixed[5], fixed[8]
     per_step, per_resistance = 1.0 / step, 1.0 / fixed[1]
     volt_per_amp = emf * per_resistance
@@ -221,7 +226,11 @@ def _driven_wheel(z: FloatArray, s: int, step: float, fixed: FloatArray) -> None
         share = z[_WINDUP, j] if limited else 1.0
         grown = held + share * z[_KI, j] * (wanted - encoder * w) * step
         held = grown if free or volts * (wanted - encoder * w) < 0.0 else held
-        faded = held * z[_KEPT, j]
+        # Whether the wheel stands is as it was measured: a loop that is reset, or is not, by a
+        # hair's breadth goes two ways, which no fit of a simulation finds.
+        square = (wheels[k, s, j] * z[_PER_REST, j]) ** 2
+        fourth = square * square
+        faded = held * (1.0 - (1.0 - z[_KEPT, j]) / (1.0 + fourth * fourth))
         z[_HELD + s, j] = faded if abs(wanted) < rest_rate else held
         # Wheel eliminated: w' = (nw + R a (v' - r' y)) / d.
         g = radius * a
@@ -346,7 +355,7 @@ def simulate(p: FloatArray, fixed: FloatArray, step: float, command: FloatArray,
     level : numpy.ndarray, shape (n, 2)
         Cosine and sine of the heading; zeros where it is not known.
     wheels : numpy.ndarray, shape (n + 1, 2, n_lanes)
-        Measured wheel rates [rad/s]; followed where `given`.
+        Measured wheel rates [rad/s]: followed where `given`; else they tell a wheel at rest.
     given : bool
         Whether the wheels turn as measured; else they are driven by the commands.
     start : numpy.ndarray, shape (5, n_lanes)
@@ -371,9 +380,9 @@ def simulate(p: FloatArray, fixed: FloatArray, step: float, command: FloatArray,
         else:
             _supply(z, command, k, step, fixed)
             _two_tyres(z, 0, fixed)
-            _driven_wheel(z, 0, step, fixed)
+            _driven_wheel(z, 0, step, fixed, wheels, k)
             _two_tyres(z, 1, fixed)
-            _driven_wheel(z, 1, step, fixed)
+            _driven_wheel(z, 1, step, fixed, wheels, k)
         _solved(z, step, keep)
         if given:
             _followed(z, 0, wheels, k)

@@ -104,14 +104,15 @@ def moved(base: Base, drive: Drive, robots: FloatArray, memory: Memory | None = 
     begin[0] = (robots[:, at('radius_left')] * begin[3]
                 + robots[:, at('radius_right')] * begin[4]) / 2.0
     wheels, command = np.zeros((drive.steps + 1, 2, len(lanes))), np.zeros((1, 2, len(lanes)))
-    if base.given:
+    if drive.wheels.times.size:
+        # Where they are not followed, they only tell whether the robot stands.
         times = drive.start + step * np.arange(drive.steps + 1)
-        late, which = distinct(robots[:, [at('wheels_late')]])
+        late, which = distinct(robots[:, [at('wheels_late')]] * base.given)
         for column, values in enumerate(drive.wheels.values.T):
             read = np.column_stack([np.interp(times + one, drive.wheels.times, values)
                                     for (one,) in late])
             wheels[:, column] = read[:, which]
-    else:
+    if not base.given:
         command = _accepted(base, drive, robots, drive.begin, commands or [drive.command])
     simulate(np.ascontiguousarray(robots[:, :len(ROBOT)].T), base.fixed, step, command,
              drive.level, wheels, base.given, begin, lanes, out)
